@@ -10,7 +10,9 @@ using infill::Pattern;
 
 constexpr Word<Pattern> kPatterns[] = {{"none", Pattern::kNone},           {"raster", Pattern::kRaster},
                                        {"contour", Pattern::kContour},     {"contour+raster", Pattern::kContourRaster},
-                                       {"honeycomb", Pattern::kHoneycomb}, {"quatrefoil", Pattern::kQuatrefoil}};
+                                       {"honeycomb", Pattern::kHoneycomb}, {"quatrefoil", Pattern::kQuatrefoil},
+                                       {"lines", Pattern::kLines},         {"grid", Pattern::kGrid},
+                                       {"gyroid", Pattern::kGyroid}};
 constexpr Word<bool> kTurns[] = {{"angle", false}, {"layer", true}};
 
 constexpr Limits kFillLength{0, kMaxMm, " mm"}, kWidth{kMinMm, 100, " mm"}, kAngle{-36000, 36000, " degrees"},
@@ -46,8 +48,9 @@ std::string gaps_by_height_text(const std::vector<std::array<double, 2>>& gaps) 
 }
 
 constexpr Key<FillSettings> kFillKeys[] = {
-    word<kPatterns, &FillSettings::pattern>({"fill", "pattern", "--pattern", "PATTERN",
-                                             "fill pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil"}),
+    word<kPatterns, &FillSettings::pattern>(
+        {"fill", "pattern", "--pattern", "PATTERN",
+         "fill pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil; lines, grid, gyroid of a density"}),
     field<&FillSettings::width_mm>({"fill", "width_mm", "--bead", "MM", "bead width in mm"}, kWidth),
     field<&FillSettings::wall_width_mm>({"fill", "wall_width_mm", "", "MM", "width of a wall's bead; 0 for that of the others"},
                                         {0, 100, " mm"}),
@@ -86,9 +89,22 @@ constexpr Key<FillSettings> kFillKeys[] = {
     field<&FillSettings::shortest_mm>({"fill", "shortest_mm", "", "MM", "shorter lines are left out"}, kFillLength),
     field<&FillSettings::cell_mm>(
         {"fill", "cell_mm", "", "MM", "honeycomb and quatrefoil: cells across flats, centre to centre"}, {0.01, 1000, " mm"}),
+    field<&FillSettings::density_percent>(
+        {"fill", "density_percent", "--density", "%", "bead volume in % of the volume inside the walls"}, {0, 100, " %"}),
+    field<&FillSettings::top_mm>({"fill", "top_mm", "", "MM", "with a density: thickness of solid skins below top faces"},
+                                 {0, 1000, " mm"})
+        .unsaid_at("0.8"),
+    field<&FillSettings::bottom_mm>(
+        {"fill", "bottom_mm", "", "MM", "with a density: thickness of solid skins above bottom faces"}, {0, 1000, " mm"})
+        .unsaid_at("0.6"),
+    field<&FillSettings::top_layers>(
+        {"fill", "top_layers", "--top-layers", "N", "number of solid layers below top faces; default: 0.8 mm"}, {0, 10'000}),
+    field<&FillSettings::bottom_layers>(
+        {"fill", "bottom_layers", "--bottom-layers", "N", "number of solid layers above bottom faces; default: 0.6 mm"},
+        {0, 10'000}),
 };
 
-constexpr std::string_view kDistanceKeys[] = {"distance_mm", "gap_formula", "gap_by_height", "gap_mm"};
+constexpr std::string_view kDistanceKeys[] = {"distance_mm", "gap_formula", "gap_by_height", "gap_mm", "density_percent"};
 
 /// Two mutually exclusive keys of one table.
 std::string check_distances(const FillChanges& changes) {
@@ -165,6 +181,7 @@ std::vector<std::string_view> distance_keys(const FillSettings& settings) {
   if (!settings.gap_formula.empty()) names.push_back("gap_formula");
   if (!settings.gap_by_height.empty()) names.push_back("gap_by_height");
   if (settings.gap_mm != std::vector<double>{0}) names.push_back("gap_mm");
+  if (settings.density_percent) names.push_back("density_percent");
   return names;
 }
 
@@ -255,8 +272,7 @@ std::string read_filling(std::string_view word, Job& job) {
     return fmt::format("'{}' is a rule for shells that overlap; give --fill-rule {} (image.fill in a file)", word, word);
   }
   if (!word.empty() && word.front() >= '0' && word.front() <= '9') {
-    return fmt::format("'{}' is no pattern; a density is the bead over the line distance: 20 % of 0.4 mm is --line-distance 2",
-                       word);
+    return fmt::format("'{}' is no pattern; a density is --density {}", word, word);
   }
   const std::string wrong = fill_settings_keys().front().read(word, job.fill.all);
   if (wrong.empty()) job.segment.all.on = false;  // a pattern instead of the segmented lines of a file
@@ -283,7 +299,7 @@ std::span<const JobKey> segment_keys() {
          decides::moves}));
     all.push_back(custom<Job, read_filling, write_no_filling>(
                       {"segment", "fill", "--fill", "FILLING",
-                       "filling: segmented, none, raster, contour, contour+raster, honeycomb, quatrefoil"},
+                       "filling: segmented, none, raster, contour, contour+raster, honeycomb, quatrefoil; lines, grid, gyroid"},
                       Form::kString)
                       .with_words(fillings));
     return all;

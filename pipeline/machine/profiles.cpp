@@ -187,8 +187,29 @@ std::optional<Warning> calibration_warning(const ExtruderProfile& profile) {
 
 bool is_named(const Job& job, std::string_view key) { return std::ranges::find(job.named, key) != job.named.end(); }
 
+namespace {
+
+/// Whether the job says how lines are spaced, or that there are none.
+bool names_filling(const Job& job) {
+  constexpr std::string_view kKeys[] = {"fill.pattern",     "fill.gap_mm", "fill.distance_mm", "fill.gap_by_height",
+                                        "fill.gap_formula", "fill.range",  "segment.fill",     "fill.group"};
+  return job.segment.any() || std::ranges::any_of(kKeys, [&](std::string_view key) { return is_named(job, key); }) ||
+         std::ranges::any_of(job.parts, [](const PartRequest& part) { return !part.fill.empty(); });
+}
+
+}  // namespace
+
+void complete_filling(Job& job) {
+  FillSettings& fill = job.fill.all;
+  if (!fill.density_percent && (needs_density(fill.pattern) || !names_filling(job))) fill.density_percent = 20;
+  if (fill.density_percent && fill.pattern == infill::Pattern::kNone && !is_named(job, "fill.pattern")) {
+    fill.pattern = infill::Pattern::kGrid;
+  }
+  if (!is_named(job, "fill.walls")) fill.walls = fill.density_percent ? 2 : 1;
+}
+
 void leave_to_machine(const Extruder& machine, Job& job) {
-  if (!is_named(job, "fill.walls")) job.fill.all.walls = 1;
+  complete_filling(job);
   if (is_named(job, "layers.thickness_mm") || !job.heights.thickness_mm.empty()) return;
   const bool listed = machine.format == "sml" && !machine.sml.pd.empty();
   job.layer_mm = listed ? machine.sml.pd.front().thickness_mm : machine.material.nozzle_mm / 2;

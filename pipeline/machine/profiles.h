@@ -68,7 +68,11 @@ std::optional<Warning> calibration_warning(const ExtruderProfile& profile);
 /// Whether a file, an option or --set gave the key, as in "fill.walls".
 bool is_named(const Job& job, std::string_view key);
 
-/// Replaces the defaults of powder jobs by the printer's where values are unset: one wall, layers of half of the nozzle.
+/// Completes the filling of an extrusion job: two walls and a grid of 20 % where the job names no pattern, no distances and no
+/// segmented lines; one wall where it does. A density without a pattern is one of a grid.
+void complete_filling(Job& job);
+
+/// Replaces the defaults of powder jobs by the printer's where values are unset: complete_filling(), layers of half of the nozzle.
 void leave_to_machine(const Extruder& machine, Job& job);
 
 // --- finds, changes and checks the powder printer of a job.

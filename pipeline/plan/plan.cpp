@@ -15,6 +15,7 @@
 #include "stages/formats/extrusion_format.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
+#include "stages/geometry/bead_section.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/heights.h"
 #include "stages/raster/beams.h"
@@ -90,10 +91,18 @@ class Planner {
   /// The filling of each part. returns  whether any part has walls or lines
   Result<bool> read_parts(const FillRequest& fill) {
     bool any = false;
+    const auto heights = heights_options(job());
+    if (!heights) return heights.error();
+    const Nm nominal = heights->set.maximum();
+    // Beads of powder are as high as the layer at their full width.
+    const BeadShape shape = moves()    ? plan_.moves->profile.machine.material.shape()
+                            : images() ? BeadShape::kRectangle
+                                       : BeadShape::kStadium;
     for (const PartRequest& part : job().parts) {
       auto filling = plan_filling(fill, part.fill);
       if (!filling) return filling.error();
       any |= filling->fills();
+      filling->set_beads(shape, nominal);
       fillings_.push_back(std::move(*filling));
     }
     return any;
@@ -312,8 +321,25 @@ class Planner {
            "--format 3mf: slices of 3MF contain contours only, the filling is not in the file; choose svg or cli"});
     }
     if (!moves()) return {};
+    warn_of_touching_lines();
     warn_of_segments(*plan_.segments, plan_.moves->profile, plan_.sections->fills(), plan_.warnings);
     return {};
+  }
+
+  /// Lines at gap 0 touch, but their round sides leave a void.
+  void warn_of_touching_lines() {
+    const FillSettings& fill = job().fill.all;
+    const bool touch = fill.pattern == infill::Pattern::kRaster || fill.pattern == infill::Pattern::kContour ||
+                       fill.pattern == infill::Pattern::kContourRaster;
+    if (!touch || plan_.segments->any() || !distance_keys(fill).empty() || !job().fill.ranges.empty()) return;
+    const double height = mm(plan_.sections->layers().front().layer.thickness);
+    const double area = bead_area(fill.width_mm, height, plan_.moves->profile.machine.material.shape());
+    const double share = 1 - area / (fill.width_mm * height);
+    if (share <= 0.05) return;
+    plan_.warnings.push_back(
+        {"voids", fmt::format("lines at gap 0 touch and leave {:.1f} % of their volume void, because their "
+                              "sides are round; --density 100 has none",
+                              100 * share)});
   }
 
   const ProgressCallback& progress_;

@@ -13,6 +13,7 @@
 #include "stages/geometry/boxes.h"
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
+#include "stages/infill/density.h"
 #include "stages/slice/bodies.h"
 
 namespace lamina::pipeline {
@@ -42,6 +43,15 @@ std::string contradiction(const FillSettings& settings) {
 }
 
 }  // namespace
+
+void FillPlan::set_beads(BeadShape shape, Nm nominal_thickness) {
+  const auto set = [&](infill::FillParameters& parameters) {
+    parameters.shape = shape;
+    parameters.nominal_thickness = nominal_thickness;
+  };
+  set(base);
+  for (FillInterval& range : ranges) set(range.parameters);
+}
 
 const infill::FillParameters& FillPlan::at(std::int64_t height) const {
   for (const FillInterval& range : ranges) {
@@ -131,6 +141,7 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   if (job.heights.per_part) {
     if (Status status = made.make_own_slicers(job, body); !status) return status.error();
   }
+  made.keep_neighbours(0);
   return made;
 }
 
@@ -279,7 +290,7 @@ Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, cons
 Status Sections::slice_layer(std::uint32_t index, slice::SectionScratch& scratch, Work& work) const {
   const ScheduledLayer& scheduled = schedule_.layers[index];
   const slice::Slicer& slicer = own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part];
-  if (neighbours_->capacity > 0) {
+  if (neighbours_->used) {
     const auto shared = share(index, scratch);
     if (!shared) return shared.error();
     work.contours = (*shared)->contours;
@@ -296,16 +307,14 @@ Status Sections::slice_layer(std::uint32_t index, slice::SectionScratch& scratch
   return again ? Status() : Status(again.error());
 }
 
-void Sections::keep_neighbours(std::uint32_t count) { neighbours_->capacity = std::max(neighbours_->capacity, count); }
-
-std::uint64_t Sections::shared_bytes() const {
-  const std::lock_guard lock(neighbours_->mutex);
-  std::uint64_t total = 0;
-  for (const auto& [index, shared] : neighbours_->kept) {
-    total += bytes_held(shared->contours.contours.point) + bytes_held(shared->contours.contours.offset);
-  }
-  return total;
+void Sections::keep_neighbours(std::uint32_t layers) {
+  const std::uint32_t reach = skin_reach();
+  if (reach == 0) return;
+  neighbours_->used = true;
+  neighbours_->contours.reserve(layers + 2 * reach + 2);
 }
+
+std::uint64_t Sections::shared_bytes() const { return neighbours_->contours.bytes(); }
 
 std::optional<std::uint32_t> Sections::above(std::uint32_t index) const {
   for (std::uint32_t next = index + 1; next < schedule_.layers.size(); ++next) {
@@ -330,25 +339,16 @@ Result<std::shared_ptr<const Sections::SharedContours>> Sections::shared_contour
 
 Result<std::shared_ptr<const Sections::SharedContours>> Sections::share(std::uint32_t index,
                                                                         slice::SectionScratch& scratch) const {
-  Neighbours& neighbours = *neighbours_;
-  {
-    const std::lock_guard lock(neighbours.mutex);
-    if (const auto found = neighbours.kept.find(index); found != neighbours.kept.end()) return found->second;
-  }
-  // Another thread may be cutting the layer as well: waiting for it would idle, and both get the same.
-  Work work;
-  const ScheduledLayer& scheduled = schedule_.layers[index];
-  const slice::Slicer& slicer = own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part];
-  const auto report = section(slicer, scheduled, scratch, work, work.contours);
-  if (!report) return report.error();
-  // Bodies of other parts have nothing in this layer.
-  work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
-  auto shared = std::make_shared<const SharedContours>(SharedContours{std::move(work.contours), *report});
-  const std::lock_guard lock(neighbours.mutex);
-  neighbours.kept.try_emplace(index, shared);
-  // Layers are made upwards: the lowest one is needed least.
-  while (neighbours.kept.size() > std::max(neighbours.capacity, 1u)) neighbours.kept.erase(neighbours.kept.begin());
-  return shared;
+  return neighbours_->contours.get(index, [&]() -> Result<SharedContours> {
+    Work work;
+    const ScheduledLayer& scheduled = schedule_.layers[index];
+    const slice::Slicer& slicer = own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part];
+    const auto report = section(slicer, scheduled, scratch, work, work.contours);
+    if (!report) return report.error();
+    // Bodies of other parts have nothing in this layer.
+    work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
+    return SharedContours{std::move(work.contours), *report};
+  });
 }
 
 Status Sections::contours(std::uint32_t index, Work& work) const {
@@ -390,6 +390,7 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
     auto outlines = infill::outlines_of(contours_of(area, work), {own, area.box, of_walls_}, filling(area, own));
     if (!outlines) return failed(area, outlines.error());
     work.outlines[a] = std::move(*outlines);
+    if (Status status = divide_skins(index, area, work.outlines[a]); !status) return failed(area, status.error());
   }
   return {};
 }
@@ -416,6 +417,56 @@ Status Sections::fill(std::uint32_t index, Work& work) const {
     if (a + 1 == body_area_[area.body + 1]) work.path_body.push_back(work.paths.size());
   }
   return {};
+}
+
+/// Of a region of an area, keeps what has the part above and below it in all layers that skins reach.
+Status Sections::keep_covered(std::uint32_t index, const Area& area, Contours& region) const {
+  const infill::FillParameters& parameters = filling(area, schedule_.layers[index].own());
+  const Layer layer = schedule_.layers[index].layer;
+  Buffer<std::uint32_t> rebased;
+  for (const bool up : {true, false}) {
+    std::optional<std::uint32_t> at = index;
+    for (std::uint32_t steps = 0; region.size() > 0; ++steps) {
+      const Layer face = schedule_.layers[*at].layer;
+      // How much of the skin of a face is on the side of the layer that is away from it.
+      const std::int64_t between = up ? std::int64_t{face.bottom} + face.thickness - layer.bottom - layer.thickness
+                                      : std::int64_t{layer.bottom} - face.bottom;
+      if (!infill::has_skin(parameters, up, steps, between)) break;
+      at = up ? above(*at) : below(*at);
+      if (!at) {
+        region.clear();
+        break;
+      }
+      const auto other = shared_contours(*at);
+      if (!other) return other.error();
+      auto both = intersect_contours(region, (*other)->contours.of(area.body, rebased));
+      if (!both) return both.error();
+      region = std::move(*both);
+    }
+  }
+  return {};
+}
+
+Status Sections::divide_skins(std::uint32_t index, const Area& area, infill::Outlines& outlines) const {
+  const infill::FillParameters& parameters = filling(area, schedule_.layers[index].own());
+  if (!infill::has_skins(parameters) || outlines.region.size() == 0) return {};
+  Contours covered = outlines.region;
+  if (Status status = keep_covered(index, area, covered); !status) return status;
+  return infill::divide_skins(covered, parameters, outlines);
+}
+
+std::uint32_t Sections::skin_reach() const {
+  if (schedule_.layers.empty()) return 0;
+  const auto thinnest =
+      std::ranges::min_element(schedule_.layers, {}, [](const ScheduledLayer& l) { return l.layer.thickness; });
+  std::uint32_t reach = 0;
+  for (const FillPlan& plan : plans_) {
+    reach = std::max(reach, infill::skin_layers(plan.base, thinnest->layer.thickness));
+    for (const FillPlan::FillInterval& range : plan.ranges) {
+      reach = std::max(reach, infill::skin_layers(range.parameters, thinnest->layer.thickness));
+    }
+  }
+  return std::min(reach, static_cast<std::uint32_t>(schedule_.layers.size()));
 }
 
 Status Sections::layer(std::uint32_t index, Work& work) const {
@@ -454,8 +505,7 @@ Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work
       bytes += of_area[a] = of_area[work.original[a]];
       continue;
     }
-    const auto bound =
-        infill::bound_fill(contours_of(area, work), work.outlines[a].region, {own, area.box}, filling(area, own));
+    const auto bound = infill::bound_fill(contours_of(area, work), work.outlines[a], {own, area.box}, filling(area, own));
     if (!bound) return failed(area, bound.error());
     of_area[a] =
         bound->points * (kOfPoint + text.point) + bound->intervals * text.interval + bound->paths * (kOfPath + text.path);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/plan/layer_cache.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/layer.h"
@@ -31,6 +31,8 @@ struct FillPlan {
   std::vector<FillInterval> ranges;  // in order, disjoint
 
   const infill::FillParameters& at(std::int64_t height) const;
+  /// For fillings by density: the cross-section of beads, and the thickness in which sparse lines have their width.
+  void set_beads(BeadShape shape, Nm nominal_thickness);
   /// Whether any layer has walls or a filling.
   bool fills() const;
 };
@@ -76,10 +78,11 @@ class Sections {
   struct SharedContours {
     slice::LayerContours contours;
     slice::SectionReport report;
+    std::uint64_t bytes() const { return bytes_held(contours.contours.point) + bytes_held(contours.contours.offset); }
   };
   Result<std::shared_ptr<const SharedContours>> shared_contours(std::uint32_t index) const;
-  /// Layers at a time whose contours shared_contours() keeps; 0 to begin with. Before the first layer.
-  void keep_neighbours(std::uint32_t count);
+  /// Keeps the neighbours of so many layers at a time for skins; 0 to begin with. Before the first layer.
+  void keep_neighbours(std::uint32_t layers);
   std::uint64_t shared_bytes() const;
   /// The layer that is printed on layer `index` of the same part, and the one that it is printed on; none at the ends.
   std::optional<std::uint32_t> above(std::uint32_t index) const;
@@ -130,11 +133,10 @@ class Sections {
     void give_back(std::unique_ptr<slice::SectionScratch> scratch);
   };
 
-  /// Contours of the last layers, of any thread.
+  /// What layers need of each other.
   struct Neighbours {
-    std::mutex mutex;
-    std::uint32_t capacity = 0;
-    std::map<std::uint32_t, std::shared_ptr<const SharedContours>> kept;
+    bool used = false;
+    LayerCache<SharedContours> contours;
   };
 
   Sections() : scratches_(std::make_unique<Scratches>()), neighbours_(std::make_unique<Neighbours>()) {}
@@ -153,6 +155,9 @@ class Sections {
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling
   Status slice_layer(std::uint32_t index, slice::SectionScratch& scratch, Work& work) const;
   Result<std::shared_ptr<const SharedContours>> share(std::uint32_t index, slice::SectionScratch& scratch) const;
+  std::uint32_t skin_reach() const;
+  Status keep_covered(std::uint32_t index, const Area& area, Contours& region) const;
+  Status divide_skins(std::uint32_t index, const Area& area, infill::Outlines& outlines) const;
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
   Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled,

@@ -95,6 +95,10 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
   if (!base && request.any()) return base.error();
   if (base) plan.base = {.settings = request.all, .plan = *base};
   if (!request.any()) return plan;
+  if (fill.all.density_percent) {
+    return Error{Fault::kUsage,
+                 "fill.density_percent (--density): segmented lines have distances of their own; leave out one of the two"};
+  }
   if (fill.all.pattern == infill::Pattern::kNone) fill.all.pattern = infill::Pattern::kRaster;
   const bool spaced = leaves_distances(fill.all);
   if (Status status = check_spacings(request.all, fill.all, ""); !status) return status.error();

@@ -179,6 +179,7 @@ class ContourMaker : public Maker {
  public:
   ContourMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
       : plan_(plan), checks_(checks), files_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
+    plan.sections->keep_neighbours(limits.max_in_flight);
     observe_contours(plan, observers_);
   }
 
@@ -238,6 +239,7 @@ class ContourMaker : public Maker {
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
+  std::uint64_t extra_bytes() const override { return plan_.sections->shared_bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Sections::Work(); }
 
   Status finish() override {
@@ -291,6 +293,7 @@ class MoveMaker : public Maker {
  public:
   MoveMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
       : plan_(plan), checks_(checks), file_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
+    plan.sections->keep_neighbours(limits.max_in_flight);
     observe_moves(plan, sums_, observers_);
   }
 
@@ -347,6 +350,7 @@ class MoveMaker : public Maker {
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
+  std::uint64_t extra_bytes() const override { return plan_.sections->shared_bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Sections::Work(); }
 
   bool times_dry_runs() const override { return true; }

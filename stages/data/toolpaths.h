@@ -20,8 +20,10 @@ enum class PathKind : std::uint8_t {
   kRaster,   // a line of a raster, or of another pattern of open lines
   kContour,  // a closed curve that fills: concentric offsets
   kLink,     // short way from the end of one raster line to the start of the next, along the edge of the filled region
-  kSkirt     // around all parts, before the first bead of any: never stored, only moved
+  kSkirt,    // around all parts, before the first bead of any: never stored, only moved
+  kSolid     // a line or link of what is solid in a part of lower density
 };
+inline constexpr std::size_t kPathKinds = 7;
 
 /// Line number of walls and links.
 inline constexpr std::int32_t kNoLine = INT32_MIN;

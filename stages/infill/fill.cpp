@@ -7,6 +7,7 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/simplify.h"
+#include "stages/infill/density.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/lines.h"
 
@@ -90,8 +91,26 @@ Result<std::uint64_t> bound_curves(const ContoursView& region, const FillContext
 
 }  // namespace
 
+namespace {
+
+/// errors  kUsage: a pattern and a density that exclude each other
+Status check_density(const FillParameters& parameters) {
+  if (!parameters.density) {
+    if (!needs_density(parameters.pattern)) return {};
+    return Error{Fault::kUsage, "lines, grid and gyroid are spaced by a density; give --density, or choose raster"};
+  }
+  if (!(*parameters.density >= 0 && *parameters.density <= 1)) {
+    return Error{Fault::kUsage, fmt::format("a density of {} %; it has to be 0 to 100", *parameters.density * 100)};
+  }
+  if (needs_density(parameters.pattern) || parameters.pattern == Pattern::kRaster) return {};
+  return Error{Fault::kUsage, "a density spaces lines, grid, gyroid and raster; other patterns take gaps"};
+}
+
+}  // namespace
+
 Status check(const FillParameters& parameters) {
   const auto wrong = [](const std::string& what) { return Error{Fault::kUsage, what}; };
+  if (Status status = check_density(parameters); !status) return status;
   if (parameters.width <= 0) return wrong("the bead width has to be above 0");
   if (parameters.walls > 0 && parameters.wall_width <= 0) return wrong("the wall's bead width has to be above 0");
   if (parameters.build_layers == 0) return wrong("the number of layers with one angle has to be 1 or more");
@@ -134,6 +153,7 @@ Status check(const FillParameters& parameters) {
 }
 
 Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& context, const FillParameters& parameters) {
+  if (parameters.density) return outlines_by_density(contours, context, parameters);
   Outlines made;
   MergeScratch scratch;
   Contours innermost;  // with all its points: what merging moves does not add up
@@ -161,8 +181,9 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
   return made;
 }
 
-Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
+Result<FillBound> bound_fill(const ContoursView& contours, const Outlines& outlines, const FillContext& context,
                              const FillParameters& parameters) {
+  const ContoursView region = outlines.region;
   // Clipper takes an offset's or a line's points as edges, joins, scan beams and result at once.
   constexpr std::uint64_t kOfClipper = 400;
   const std::uint64_t surface = contours.point.size(), own = region.point.size();
@@ -170,6 +191,14 @@ Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& r
   bound.points = parameters.walls * (2 * surface + contours.size());
   bound.paths = bound.intervals = bound.points / 4;  // a closed path has three corners or more, and its first one again
   if (parameters.walls > 0) bound.scratch_bytes = kOfClipper * surface;
+  if (parameters.density) {
+    const FillBound inside = bound_by_density(outlines, context, parameters);
+    bound.points += inside.points;
+    bound.paths += inside.paths;
+    bound.intervals += inside.intervals;
+    bound.scratch_bytes += inside.scratch_bytes;
+    return bound;
+  }
   if (region.size() == 0) return bound;
   if (parameters.pattern == Pattern::kContour || parameters.pattern == Pattern::kContourRaster) {
     const auto positions = positions_inwards(region, context, parameters);
@@ -207,6 +236,7 @@ Status append_fill(Outlines outlines, const FillContext& context, const FillPara
   for (std::size_t wall = 0; wall < outlines.walls.size(); ++wall) {
     append_closed(outlines.walls[wall], wall == 0 ? PathKind::kOuter : PathKind::kInner, parameters.wall_width, out);
   }
+  if (parameters.density) return append_by_density(outlines, context, parameters, out);
   Contours& region = outlines.region;
   if (region.size() == 0) return {};
   if (parameters.pattern == Pattern::kContour) return append_curves(region, context, parameters, UINT32_MAX, out);

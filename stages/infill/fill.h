@@ -24,10 +24,13 @@ Status check(const FillParameters& parameters);
 struct Outlines {
   std::vector<Contours> walls;  // from the surface inwards; one that would hold nothing ends them
   Contours region;              // of filling beads: the contours moved inwards past the walls; nothing for kNone
+  // --- by density: all inside the walls is `region`, whose sparse lines end at its edge, or `solid`
+  Contours solid;
 
   std::uint64_t bytes() const {
-    std::uint64_t sum = bytes_held(region.point) + bytes_held(region.offset);
-    for (const Contours& wall : walls) sum += bytes_held(wall.point) + bytes_held(wall.offset);
+    const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
+    std::uint64_t sum = of(region) + of(solid);
+    for (const Contours& wall : walls) sum += of(wall);
     return sum;
   }
 };
@@ -52,7 +55,7 @@ struct FillBound {
 };
 /// errors  as outlines_of
 /// cost    O(P log L) for P points of the region and L lines; of curves, an eighth of the cost of append_fill
-Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
+Result<FillBound> bound_fill(const ContoursView& contours, const Outlines& outlines, const FillContext& context,
                              const FillParameters& parameters);
 
 }  // namespace lamina::infill

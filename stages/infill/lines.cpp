@@ -83,6 +83,31 @@ class Scan {
     }
   }
 
+  /// Walks from the crossing of `line` with `edge` along the contour, upwards or downwards, as far as it leaves the line where
+  /// it comes back before it meets a neighbouring one: to the corner that no line reaches. `way` is empty if it meets one.
+  void walk_to_corner(std::uint32_t line, std::uint32_t edge, bool at_end, bool upwards, Buffer<Point2>& way) const {
+    way.clear();
+    const bool forwards = at_end == upwards;
+    const std::int64_t here = at_[line];
+    std::int64_t limit = upwards ? INT64_MAX : INT64_MIN, furthest = here;
+    if (upwards && line + 1 < lines()) limit = at_[line + 1];
+    if (!upwards && line > 0) limit = at_[line - 1];
+    std::size_t corner = 0;
+    for (std::uint32_t e = edge;; e = forwards ? next_[e] : previous_[e]) {
+      const Point2 p = point_[forwards ? next_[e] : e];
+      if (upwards ? p.y > limit : p.y <= limit) {
+        if (interval_at(upwards ? line + 1 : line - 1, e, at_end) != kNone) return way.clear();
+        limit = upwards ? INT64_MAX : INT64_MIN;  // it only touches the corner
+      }
+      if (upwards ? p.y <= here : p.y > here) break;
+      way.push_back(p);
+      if (upwards ? p.y <= furthest : p.y >= furthest) continue;
+      furthest = p.y;
+      corner = way.size();
+    }
+    way.resize(corner);
+  }
+
  private:
   /// Of each point, the first line at or above it. Between neighbours of a contour are the lines that their edge crosses.
   void find_lines(const ContoursView& region) {
@@ -306,13 +331,22 @@ void append_raster(const ContoursView& region, const FillParameters& parameters,
         const bool forwards = (number % 2 == 0) != frame.reversed();
         const auto v = static_cast<Nm>(positions.at[line]);
         const Point2 from{forwards ? interval.begin : interval.end, v}, to{forwards ? interval.end : interval.begin, v};
+        const std::uint32_t from_edge = forwards ? interval.begin_edge : interval.end_edge,
+                            to_edge = forwards ? interval.end_edge : interval.begin_edge;
+        if (parameters.fills_corners && line == first) {
+          scan.walk_to_corner(line, from_edge, !forwards, false, way);
+          for (std::size_t i = way.size(); i-- > 0;) out.add(frame.from(way[i]), PathKind::kLink, parameters.width);
+        }
         out.add(frame.from(from), PathKind::kRaster, parameters.width, number);
-        const std::uint32_t found =
-            scan.walk(line, forwards ? interval.end_edge : interval.begin_edge, forwards, to, longest_link, way);
+        const std::uint32_t found = scan.walk(line, to_edge, forwards, to, longest_link, way);
         const bool links = found != kNone && !scan.interval(found).deposited &&
                            std::int64_t{scan.interval(found).end} - scan.interval(found).begin >= parameters.shortest_line;
         if (!links) {
-          out.add(frame.from(to), PathKind::kRaster, parameters.width, number);
+          way.clear();
+          if (parameters.fills_corners) scan.walk_to_corner(line, to_edge, forwards, true, way);
+          const bool ends = way.empty();
+          out.add(frame.from(to), ends ? PathKind::kRaster : PathKind::kLink, parameters.width, ends ? number : kNoLine);
+          for (const Point2 p : way) out.add(frame.from(p), PathKind::kLink, parameters.width);
           break;
         }
         out.add(frame.from(to), PathKind::kLink, parameters.width);

@@ -40,6 +40,11 @@ FillParameters parameters_of(const FillSettings& settings) {
   if (settings.link_mm) p.longest_link = nm_of(*settings.link_mm);
   p.shortest_line = short_nm(settings.shortest_mm);
   p.cell = short_nm(settings.cell_mm);
+  if (settings.density_percent) p.density = *settings.density_percent / 100;
+  p.top = short_nm(settings.top_mm);
+  p.bottom = short_nm(settings.bottom_mm);
+  p.top_layers = settings.top_layers;
+  p.bottom_layers = settings.bottom_layers;
   return p;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stages/data/choices.h"
+#include "stages/data/extruder.h"  // BeadShape
 #include "stages/data/layer.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/units.h"
@@ -52,7 +53,15 @@ struct FillParameters {
                                    // walls). Absent: beads touch the wall, or overlap it as they do each other
   std::int64_t longest_link = -1;  // between two lines along the edge; -1: three distances; 0: no links
   Nm shortest_line = 0;            // shorter lines are left out
+  bool fills_corners = false;      // kRaster: the ends of paths follow the edge into corners that no line reaches
   Nm cell = 2'000'000;             // kHoneycomb, kQuatrefoil: cells across flats, centre to centre
+
+  // --- by density (density.h): all of the above that spaces lines is unused
+  std::optional<double> density;                           // 0 .. 1
+  BeadShape shape = BeadShape::kStadium;                   // cross-section of the beads, which decides their pitch
+  Nm nominal_thickness = 200'000;                          // of the layers in which sparse lines are `width` wide
+  Nm top = 0, bottom = 0;                                  // thickness of skins; 0: none
+  std::optional<std::uint32_t> top_layers, bottom_layers;  // instead
 };
 
 /// Settings as the stage takes them, in nm and micro-degrees; not checked, see check() in fill.h.

@@ -15,8 +15,14 @@ enum class Pattern : std::uint8_t {
   kContour,        // closed curves at equal distances, inwards
   kContourRaster,  // some of those, then a raster inside them
   kHoneycomb,      // trapezoid waves that touch: hexagonal cells
-  kQuatrefoil      // round waves kept apart: no closed cells in a layer
+  kQuatrefoil,     // round waves kept apart: no closed cells in a layer
+  kLines,          // parallel lines without links; of a density only
+  kGrid,           // lines in two directions in every layer; of a density only
+  kGyroid          // sections of a gyroid, a surface that divides space into two equal labyrinths; of a density only
 };
+
+/// Whether a pattern is spaced by a density alone.
+constexpr bool needs_density(Pattern pattern) { return pattern >= Pattern::kLines; }
 
 /// One filling as people describe it: lengths in mm, angles in degrees. Lists are taken in turn.
 struct FillSettings {
@@ -37,6 +43,10 @@ struct FillSettings {
   std::optional<double> first_line_mm, end_inset_mm, link_mm;
   double shortest_mm = 0;
   double cell_mm = 2;
+  // --- a filling by its share of the volume inside the walls (density.h), in place of gaps and distances
+  std::optional<double> density_percent;
+  double top_mm = 0.8, bottom_mm = 0.6;                    // thickness of solid skins below and above horizontal faces
+  std::optional<std::uint32_t> top_layers, bottom_layers;  // of skins, instead of their thickness
 };
 
 }  // namespace lamina::infill

@@ -149,7 +149,7 @@ class MoveTable {
   const LayerCut& cut_;
   const Extruder& machine_;
   double height_, reference_, wall_, inner_;  // mm, mm/s
-  std::array<MoveEntry, 15> table_;
+  std::array<MoveEntry, kPathKinds * 3> table_;
   MoveEntry swept_;  // of a line of its own kind: not kept
 };
 

@@ -49,10 +49,11 @@ Ink shade(const Ink& ink, std::size_t step, std::size_t steps) {
 
 namespace {
 
-constexpr std::array<std::pair<PathKind, std::string_view>, 5> kKinds = {{{PathKind::kOuter, "outer wall"},
+constexpr std::array<std::pair<PathKind, std::string_view>, 6> kKinds = {{{PathKind::kOuter, "outer wall"},
                                                                           {PathKind::kInner, "inner wall"},
                                                                           {PathKind::kContour, "closed curve"},
                                                                           {PathKind::kLink, "link"},
+                                                                          {PathKind::kSolid, "solid line"},
                                                                           {PathKind::kRaster, "line"}}};
 
 /// What the beads of a kind cover, width by width.
@@ -84,7 +85,8 @@ constexpr std::size_t kMaxShades = 4;
 
 /// Equal in all pictures.
 Ink ink_of(PathKind kind) {
-  constexpr Ink kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}, {127, 140, 141}};
+  constexpr Ink kInks[] = {{176, 58, 46},  {214, 137, 16},  {36, 113, 163}, {17, 120, 100},
+                           {142, 68, 173}, {127, 140, 141}, {28, 58, 112}};
   return kInks[static_cast<std::size_t>(kind)];
 }
 
@@ -95,7 +97,8 @@ PathKind kind_of(const std::string& type) {
   const auto has = [&](std::string_view part) { return word.find(part) != std::string::npos; };
   if (has("skirt") || has("brim")) return PathKind::kSkirt;
   if (has("support") || has("prime") || has("wipe") || has("custom")) return PathKind::kLink;
-  if (has("infill") || has("fill") || has("skin") || has("surface") || word.empty()) return PathKind::kRaster;
+  if (has("solid") || has("skin") || has("surface")) return PathKind::kSolid;
+  if (has("infill") || has("fill") || word.empty()) return PathKind::kRaster;
   if (has("external") || has("outer")) return PathKind::kOuter;
   return PathKind::kInner;
 }

@@ -46,7 +46,7 @@ TEST(Fill, NoBeadCentreLeavesItsRegionForAnyOutlinePatternAngleAndGap) {
           ASSERT_TRUE(outlines.ok());
           const Contours& region = outlines->region;
           const Toolpaths paths = filled(outline.contours, context, parameters);
-          const auto bound = infill::bound_fill(outline.contours, region, context, parameters);
+          const auto bound = infill::bound_fill(outline.contours, *outlines, context, parameters);
           ASSERT_TRUE(bound.ok());
           ASSERT_LE(paths.point.size(), bound->points) << outline.name << ", pattern " << static_cast<int>(pattern);
           ASSERT_EQ(paths.kind.size(), paths.point.size());

@@ -64,9 +64,9 @@ CommandSpec plan_spec(const PlanCommand& row) {
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
   const bool rastered = row.product == Product::kImages;  // else no limit is known
-  spec.options.push_back({"--timing", "",
-                          rastered ? "break down the run time and compare it with the hardware limit" : "break down the run time",
-                          "", "Run"});
+  spec.options.push_back(
+      {"--timing", "", rastered ? "break down the run time and compare it with the hardware limit" : "break down the run time",
+       "", "Run"});
   spec.options.push_back({"--json", "", "print the result as one JSON object on stdout", "", "Run"});
   spec.options.push_back({"--quiet", "", "print errors only", "", "Run"});
   spec.more = row.closing;
@@ -77,7 +77,10 @@ CommandSpec plan_spec(const PlanCommand& row) {
 std::vector<std::string> notes_on_defaults(const std::string& path, const Job& job) {
   const std::string file = path == "-" ? "the job" : path;
   std::vector<std::string> notes;
-  if (!is_named(job, "fill.walls")) notes.push_back(file + " names no fill.walls: the default is 1; write walls = 0 for none");
+  if (!is_named(job, "fill.walls")) {
+    notes.push_back(
+        fmt::format("{} names no fill.walls: the default is {}; write walls = 0 for none", file, job.fill.all.walls));
+  }
   if (!is_named(job, "layers.thickness_mm") && job.heights.thickness_mm.empty()) {
     notes.push_back(fmt::format("{} names no layers.thickness_mm: layers are {:g} mm, by the printer", file, job.layer_mm));
   }
@@ -266,7 +269,7 @@ constexpr std::string_view kExtrudeKeys =
     "run.threads run.memory run.sync run.layers run.strict run.allow_empty part";
 
 constexpr std::string_view kExtrudeBasic =
-    "--output --machine --layer --walls --fill --line-distance --bead --angle --angle-step --print-speed --skirt "
+    "--output --machine --layer --walls --density --pattern --top-layers --bottom-layers --fill --bead --angle --print-speed --skirt "
     "--copies --at --rotate --scale --unit --heights --job --resume";
 
 const OptionSpec kExtrudeSwitches[] = {
@@ -279,7 +282,8 @@ const OptionSpec kExtrudeWords[] = {
     {"--machine", "", "extrusion printer: a name listed below, or a profile in TOML", "marlin", ""},
     {"--layer", "", "", "half of the nozzle", ""},
     {"--tolerance", "", "", "10", ""},
-    {"--walls", "", "", "1", ""}};
+    {"--walls", "", "", "2; with a pattern 1", ""},
+    {"--density", "", "", "20, of a grid, unless a pattern is given", ""}};
 
 std::string extrude_closing() {
   std::string text = "Machines:\n";
@@ -288,10 +292,12 @@ std::string extrude_closing() {
     text += fmt::format("  {:<16}{}\n", shipped.name, profile ? profile->machine.description : "");
   }
   return text +
-         "\nThe defaults are one wall and layers of half the nozzle diameter; for SML, the first thickness of its table. Lengths are\n"
-         "mm, angles degrees.\n"
+         "\nThe defaults are two walls, a grid of 20 % with solid tops and bottoms, and layers of half the nozzle diameter; for SML,\n"
+         "the first thickness of its table. With --fill or --pattern: one wall, no solid tops. Lengths are mm, angles degrees.\n"
          "docs/reference/extrude.md has the profiles and the file formats, docs/reference/segmented.md the segmented filling.\n\n"
          "Examples:\n"
+         "  lamina extrude bracket.stl --machine marlin -o bracket.gcode\n"
+         "  lamina extrude bracket.stl --machine marlin --density 15 --pattern gyroid --top-layers 5 -o bracket.gcode\n"
          "  lamina extrude bracket.stl --machine marlin --layer 0.2 --walls 2 --fill raster --bead-gap 1 -o bracket.gcode\n"
          "  lamina extrude part.stl --machine anet-a8 --layer 0.3 --fill segmented --angle 90 --angle-step 0 -o part.gcode\n"
          "  lamina extrude part.stl --machine anet-a8 --layer 0.3 --fill segmented --extrusion 125 --thin 2 -o part.gcode\n"
@@ -300,6 +306,7 @@ std::string extrude_closing() {
 
 Status complete_extrude(const Arguments&, Job& job) {
   if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
+  complete_filling(job);
   if (job.output.empty() && !job.dry_run) return usage("-o FILE is missing; name the file for the toolpaths, or use --dry-run");
   std::error_code ignored;
   if (job.output.empty() || (!std::filesystem::is_directory(job.output, ignored) && !job.output.ends_with('/'))) return {};

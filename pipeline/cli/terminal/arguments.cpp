@@ -78,7 +78,11 @@ std::string first_examples(std::string_view end) {
 
 /// Options of other slicers with the meaning and the values of one of lamina, which are accepted in its place.
 constexpr std::string_view kAcceptedAliases[][2] = {
-    {"--layer", "--layer-height"}, {"--fill", "--infill"}, {"--walls", "--perimeters --wall-loops --wall-line-count"}};
+    {"--layer", "--layer-height"},
+    {"--density", "--infill --fill-density --infill-sparse-density"},
+    {"--walls", "--perimeters --wall-loops --wall-line-count"},
+    {"--top-layers", "--top-solid-layers"},
+    {"--bottom-layers", "--bottom-solid-layers"}};
 
 /// An option of lamina, the options of other slicers that it is called there, and what differs.
 struct SlicerAlias {
@@ -86,8 +90,6 @@ struct SlicerAlias {
 };
 // Of two rows of a word, the first whose option the command has counts. Without an option of ours, lamina has nothing of it.
 constexpr SlicerAlias kSlicerAliases[] = {
-    {"--line-distance", "--fill-density --infill-density --infill-sparse-density",
-     "it is the width of a bead over the density, as 2 for 0.4 mm and 20 %"},
     {"--line-distance", "--infill-line-distance"},
     {"--pattern", "--fill-pattern --infill-pattern"},
     {"--angle", "--fill-angle --infill-angle --infill-angles"},

@@ -26,12 +26,14 @@ std::string_view type_name(PathKind kind) {
     case PathKind::kOuter: return "External perimeter";
     case PathKind::kInner: return "Perimeter";
     case PathKind::kSkirt: return "Skirt/Brim";
+    case PathKind::kSolid: return "Solid infill";
     default: return "Internal infill";
   }
 }
 
-int type_of(PathKind kind) {
-  return kind == PathKind::kOuter ? 0 : kind == PathKind::kInner ? 1 : kind == PathKind::kSkirt ? 3 : 2;
+/// The kinds with one name are one type.
+PathKind type_of(PathKind kind) {
+  return kind == PathKind::kContour || kind == PathKind::kLink ? PathKind::kRaster : kind;
 }
 
 }  // namespace
@@ -96,8 +98,8 @@ void LayerWriter::extrude_to(double filament_mm, char*& text) {
 }
 
 void LayerWriter::tags(const BeadMove& move) {
-  if (type_of(move.kind) != kind_) {
-    kind_ = type_of(move.kind);
+  if (const int type = static_cast<int>(type_of(move.kind)); type != kind_) {
+    kind_ = type;
     append(out_, ";TYPE:");
     append(out_, type_name(move.kind));
     append(out_, "\n");

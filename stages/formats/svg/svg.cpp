@@ -31,6 +31,7 @@ PathStyle style_of(PathKind kind) {
     case PathKind::kContour: return {"contour", "#16a085"};
     case PathKind::kLink: return {"link", "#8e44ad"};
     case PathKind::kSkirt: return {"skirt", "#7f8c8d"};
+    case PathKind::kSolid: return {"solid", "#27408b"};
   }
   return {"", "#000000"};
 }
