@@ -56,11 +56,10 @@ void replace_profile(TomlValue& value, std::string_view key, const fs::path& fol
   std::error_code ignored;
   if (names_stream(file) || !is_profile_path(value.text) || fs::exists(value.text, ignored)) return;
   const bool here = fs::path(said).is_relative() && fs::exists(said, ignored);
-  job.missing.emplace_back(value.text,
-                           fmt::format("{}machine.{}: {}: no such machine profile; correct it (relative paths start at "
-                                       "the job file{})",
-                                       value.position.text(file), key, one_line(value.text),
-                                       here ? ", not where lamina runs, where " + one_line(said) + " is" : ""));
+  job.missing.emplace_back(value.text, fmt::format("{}{}: {}: no such machine profile; correct it (relative paths start at "
+                                                   "the job file{})",
+                                                   value.position.text(file), key, one_line(value.text),
+                                                   here ? ", not where lamina runs, where " + one_line(said) + " is" : ""));
 }
 
 /// Of a list, or of a text with commas. errors  kUsage: the folder's name has a comma
@@ -72,7 +71,7 @@ Status replace_presets(TomlValue& presets, const fs::path& folder, const std::st
   for (std::size_t i = 0; i < names.size(); ++i) {
     const TextPosition position = names.size() == presets.value.size() ? presets.value[i].position : presets.position;
     TomlValue& preset = list.value.emplace_back(TomlValue{TomlValue::Kind::kText, std::move(names[i]), {}, {}, position});
-    replace_profile(preset, "presets", folder, file, job);
+    replace_profile(preset, "machine.presets", folder, file, job);
     if (preset.text.find(',') == std::string::npos) continue;
     return refuse(file, position, "machine.presets: " + divided(preset.text));
   }
@@ -80,18 +79,21 @@ Status replace_presets(TomlValue& presets, const fs::path& folder, const std::st
   return {};
 }
 
-/// Makes part.path, run.output, machine.profile and machine.presets of a job's tree paths from the working directory.
-/// file  the job file, for its folder and for messages; of a stream paths stay as they are
-/// errors  kUsage: a comma in the path of a preset, which divides them
+/// Makes part.path, run.output, extrude.material, machine.profile and machine.presets of a job's tree paths from the working
+/// directory. file  the job file, for its folder and for messages; of a stream paths stay as they are errors  kUsage: a comma
+/// in the path of a preset, which divides them
 Status replace_paths(TomlValue& tree, const std::string& file, Job& job) {
   const fs::path folder = names_stream(file) ? fs::path() : fs::path(file).parent_path();
   if (TomlValue* const parts = tree.find("part"); parts != nullptr && parts->is_list()) {
     for (TomlValue& part : parts->value) replace_path(&part, "path", folder);
   }
   replace_path(tree.find("run"), "output", folder);
+  TomlValue* const extrude = tree.find("extrude");
+  TomlValue* const material = extrude != nullptr && extrude->is_table() ? extrude->find("material") : nullptr;
+  if (material != nullptr) replace_profile(*material, "extrude.material", folder, file, job);
   TomlValue* const machine = tree.find("machine");
   if (machine == nullptr || !machine->is_table()) return {};
-  if (TomlValue* const profile = machine->find("profile")) replace_profile(*profile, "profile", folder, file, job);
+  if (TomlValue* const profile = machine->find("profile")) replace_profile(*profile, "machine.profile", folder, file, job);
   TomlValue* const presets = machine->find("presets");
   return presets == nullptr ? Status() : replace_presets(*presets, folder, file, job);
 }
@@ -115,7 +117,10 @@ std::string profile_name(const std::string& name) {
 }
 
 /// Whether a job file in `folder` can name them. errors  kUsage: a path that is not UTF-8, a preset's with a comma
-Status check_nameable(const std::string& folder, const MachineRequest& machine) {
+Status check_nameable(const std::string& folder, const Job& job) {
+  const MachineRequest& machine = job.machine;
+  if (!is_utf8(profile_in(folder, job.extrude.material)))
+    return Error{Fault::kUsage, job.extrude.material + ": a job file cannot name it, it is not UTF-8; rename it"};
   for (std::size_t i = 0; i <= machine.presets.size(); ++i) {
     const std::string name = profile_in(folder, i == 0 ? machine.profile : machine.presets[i - 1]);
     if (!is_utf8(name)) return Error{Fault::kUsage, name + ": a job file cannot name it, it is not UTF-8; rename it"};
@@ -179,9 +184,10 @@ std::string part_text(const PartRequest& part) {
 }
 
 template <class Change>
-void change_profiles(MachineRequest& machine, const Change& change) {
-  machine.profile = change(machine.profile);
-  for (std::string& preset : machine.presets) preset = change(preset);
+void change_profiles(Job& job, const Change& change) {
+  job.machine.profile = change(job.machine.profile);
+  job.extrude.material = change(job.extrude.material);
+  for (std::string& preset : job.machine.presets) preset = change(preset);
 }
 
 /// The value of an assignment: text, or TOML in quotes, brackets or braces.
@@ -258,7 +264,7 @@ Status set_key(Job& job, std::string_view assignment) {
 std::string job_text(const Job& job, const std::string& directory) {
   Job named = job;
   named.output = path_in(directory, named.output);
-  change_profiles(named.machine, [&](const std::string& name) { return profile_in(directory, name); });
+  change_profiles(named, [&](const std::string& name) { return profile_in(directory, name); });
   for (PartRequest& part : named.parts) part.path = path_in(directory, part.path);
   std::string text = sections_text(job_keys(), named, [](const JobKey&, const std::string& value) { return !value.empty(); });
   for (const PartRequest& part : named.parts) text += part_text(part);
@@ -269,7 +275,7 @@ std::string canonical_job_text(const Job& job, Product product) {
   const bool filled = product == Product::kImages && fills(job);  // by beads, which [fill] and [segment] decide
   Job whole = job;
   whole.slice.tolerance_um = tolerance_um_of(job, product);
-  change_profiles(whole.machine, profile_name);
+  change_profiles(whole, profile_name);
   std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
     return !value.empty() && ((key.decides & bit(product)) != 0 || (filled && of_filling));
@@ -288,7 +294,7 @@ Result<File> write_job(const std::string& path, const Job& job, bool durable, st
   }
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
-  if (Status status = check_nameable(directory.string(), job.machine); !status) return status.error();
+  if (Status status = check_nameable(directory.string(), job); !status) return status.error();
   const std::string text = job_command_line(command) + "\n\n" + job_text(job, directory.string());
   auto file = File::open(path, {.durable = durable ? Durable::kAll : Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());

@@ -79,6 +79,7 @@ struct ExtrudeRequest {
       fan_percent;
   std::optional<bool> relative_extrusion;
   std::optional<std::uint32_t> skirt_loops;
+  std::string material;                                      // name of a material, or a file; empty: the printer's
   std::vector<std::pair<std::string, std::string>> machine;  // other profile keys with values: fan.from_layer, 2
 };
 

@@ -355,6 +355,8 @@ JobKey number(std::string_view name, std::string_view flag, std::string_view uni
 }
 
 const JobKey kExtrudeKeys[] = {
+    text<check_path, &Job::extrude, &ExtrudeRequest::material>(
+        {"extrude", "material", "--material", "NAME|FILE", "material preset; default: the printer's", decides::moves}),
     number<&ExtrudeRequest::flow>("flow", "--flow", "FACTOR", 0.01, 10, "extrusion multiplier"),
     number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600,
                                          "nozzle temperature in degrees Celsius"),

@@ -50,6 +50,39 @@ Result<ExtruderProfile> extruder_of(const ProfileFiles& files) {
   return profile;
 }
 
+/// Adds the files of a material, which change those of a printer.
+/// errors  kUsage, with the known names; sections that are not a material's
+Status add_material(const std::string& name_or_file, ProfileFiles& files) {
+  const auto found = find(name_or_file, shipped_materials(), [&](const std::string& near, const std::string& names) {
+    return fmt::format("no material '{}'{}; name a profile (a file that ends in .toml) or one of {}", one_line(name_or_file),
+                       near, names);
+  });
+  if (!found) return found.error();
+  for (const ProfileFile& file : *found) {
+    for (const std::string& section : file.keys.name) {
+      if (section == "material" || section == "fan") continue;
+      return usage("{}: [{}] is no section of a material, which has [material] and [fan]; leave it out", file.where,
+                   one_line(section));
+    }
+    files.push_back(file);
+  }
+  return {};
+}
+
+/// errors  kUsage: one of the temperatures is above those of the machine
+Status check_temperatures(const Extruder& machine) {
+  const auto& m = machine.material;
+  const auto check = [&](std::string_view what, double degc, double maximum, std::string_view key) -> Status {
+    if (maximum <= 0 || degc <= maximum) return {};
+    return usage("{}{} of {:g} degrees: {} reaches {:g} (machine.{}); choose a material or a temperature below it",
+                 m.name.empty() ? "" : m.name + ": ", what, degc, machine.name, maximum, key);
+  };
+  if (Status status = check("nozzle", std::max(m.nozzle_degc, m.first_nozzle_degc), machine.max_nozzle_degc, "max_nozzle_degc");
+      !status)
+    return status;
+  return check("bed", std::max(m.bed_degc, m.first_bed_degc), machine.max_bed_degc, "max_bed_degc");
+}
+
 /// errors  kUsage: one of the profiles is not there, says the job file that names it
 Status check_there(const Job& job, const std::vector<std::string>& presets) {
   for (const auto& [path, what] : job.missing) {
@@ -62,7 +95,7 @@ Status check_there(const Job& job, const std::vector<std::string>& presets) {
 
 Library profile_library() {
   std::vector<ShippedProfile> all;
-  for (const auto shipped : {shipped_machines(), shipped_presets(), shipped_extruders()})
+  for (const auto shipped : {shipped_machines(), shipped_presets(), shipped_extruders(), shipped_materials()})
     all.insert(all.end(), shipped.begin(), shipped.end());
   return {std::move(all), profile_folder()};
 }
@@ -107,14 +140,17 @@ Result<Machine> find_machine(const std::string& name_or_file, const std::vector<
   return files ? read_machine(*files) : files.error();
 }
 
-Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
-  const auto files = find(name_or_file, shipped_extruders(), [&](const std::string& near, const std::string& names) {
+Result<ExtruderProfile> find_extruder(const std::string& name_or_file, const std::string& material) {
+  auto files = find(name_or_file, shipped_extruders(), [&](const std::string& near, const std::string& names) {
     if (is_one_of(shipped_machines(), name_or_file))
       return fmt::format("'{}' is a powder printer, of lamina jet; name a profile or one of {}", name_or_file, names);
     return fmt::format("no extrusion printer '{}'{}; name a profile (a file that ends in .toml) or one of {}",
                        one_line(name_or_file), near, names);
   });
-  return files ? extruder_of(*files) : files.error();
+  if (!files) return files.error();
+  if (Status status = material.empty() ? Status() : add_material(material, *files); !status)
+    return Error{status.error().fault, "--material: " + status.error().message};
+  return extruder_of(*files);
 }
 
 Result<bool> names_extruder(const std::string& name_or_file) {
@@ -129,9 +165,12 @@ Result<bool> names_extruder(const std::string& name_or_file) {
 }
 
 Result<ExtruderProfile> resolve_extruder(const Job& job) {
-  if (Status status = check_there(job, {}); !status) return status.error();
-  auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
-  if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
+  if (Status status = check_there(job, {job.extrude.material}); !status) return status.error();
+  auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile, job.extrude.material);
+  if (!found) {
+    const bool of_material = found.error().message.starts_with("--material: ");
+    return Error{found.error().fault, (of_material ? "" : "--machine: ") + found.error().message};
+  }
   ExtruderProfile& profile = *found;
   for (const auto& [name, value] : job.extrude.machine) {
     if (const std::string wrong = set_extruder_key(name, value, profile); !wrong.empty())
@@ -150,6 +189,7 @@ Result<ExtruderProfile> resolve_extruder(const Job& job) {
   if (r.fan_percent) m.fan.percent = *r.fan_percent;
   if (r.skirt_loops) m.skirt.loops = *r.skirt_loops;
   if (r.relative_extrusion) m.code.relative_extrusion = *r.relative_extrusion;
+  if (Status status = check_temperatures(m); !status) return status.error();
   return found;
 }
 

@@ -24,6 +24,7 @@ namespace lamina::pipeline {
 std::span<const ShippedProfile> shipped_machines();   // powder printers, pipeline/machine/shipped/printers/*.toml
 std::span<const ShippedProfile> shipped_presets();    // powder, binder and process for them, presets/*.toml there
 std::span<const ShippedProfile> shipped_extruders();  // pipeline/machine/shipped/extruders/*.toml
+std::span<const ShippedProfile> shipped_materials();  // filaments for them, pipeline/machine/shipped/materials/*.toml
 
 /// All of them, and the user's own.
 Library profile_library();
@@ -44,7 +45,9 @@ Result<ProfileFiles> machine_files(const std::string& name_or_file, const std::v
 /// The profile with that name, or in that file (a text with a slash or ending in .toml).
 /// errors  kUsage, with the known names
 Result<Machine> find_machine(const std::string& name_or_file, const std::vector<std::string>& presets = {});
-Result<ExtruderProfile> find_extruder(const std::string& name_or_file);
+/// material  that changes an extrusion printer, by name or file; empty: the printer's
+/// errors    kUsage: an unknown material, or keys that are not a material's
+Result<ExtruderProfile> find_extruder(const std::string& name_or_file, const std::string& material = {});
 
 /// Whether it is the profile of an extrusion printer, else of a powder printer; a file may be wrong in other ways.
 /// errors  kUsage: neither, with the shipped names
@@ -52,8 +55,8 @@ Result<bool> names_extruder(const std::string& name_or_file);
 
 // --- the extrusion printer of a job.
 
-/// Finds the job's printer (default: marlin) and applies the job's changes to it.
-/// errors  kUsage
+/// Finds the job's printer (default: marlin) and applies the job's material and changes to it.
+/// errors  kUsage; temperatures above those that the printer reaches
 Result<ExtruderProfile> resolve_extruder(const Job& job);
 
 /// Whether widths of segmented lines were measured on this printer, or on the one that the documents had.

@@ -14,10 +14,10 @@
 namespace lamina::pipeline {
 namespace {
 
-/// The shipped printer of that name. errors  those of read_extruder
+/// The shipped printer of that name. errors  those of find_extruder
 Result<std::optional<ExtruderProfile>> shipped_extruder_named(const std::string& name) {
   for (const ShippedProfile& shipped : shipped_extruders()) {
-    Result<ExtruderProfile> profile = read_extruder(shipped.text, std::string(shipped.name));
+    Result<ExtruderProfile> profile = find_extruder(std::string(shipped.name));
     if (!profile) return profile.error();
     if (profile->machine.name == name) return std::optional<ExtruderProfile>(std::move(*profile));
   }

@@ -9,6 +9,7 @@
 #include "pipeline/plan/layers.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/formats/gcode/write_gcode.h"
+#include "stages/geometry/bead_section.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
@@ -309,6 +310,7 @@ class SegmentObserver : public MoveObserver {
   void warn(const Summary&, std::vector<Warning>& warnings) override {
     std::string slow = speed_warning(sums_.deposited.shorts, plan_.moves->profile.machine);
     if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
+    if (std::string fast = melt_warning(); !fast.empty()) warnings.push_back({"melt-rate", std::move(fast)});
   }
   void report(Summary& summary) const override {
     report_deposited(sums_.deposited, ranges_, plan_.moves->profile.machine, first_layer_points_, summary.results,
@@ -316,6 +318,32 @@ class SegmentObserver : public MoveObserver {
   }
 
  private:
+  /// Thick and thin segments that take more than the material's melt rate in the thickest layer; "" if none does. Their speeds
+  /// decide the pores, so that they are not limited.
+  std::string melt_warning() const {
+    const Extruder& machine = plan_.moves->profile.machine;
+    const auto& material = machine.material;
+    if (!(material.max_melt_mm3_s > 0)) return {};
+    Nm thickest = 0;
+    for (const ScheduledLayer& layer : plan_.sections->layers()) thickest = std::max(thickest, layer.own().thickness);
+    double rate = 0;
+    for (const auto& [heights, range] : segmented_) {
+      const segment::Segmentation& s = range->plan;
+      rate = std::max(rate, s.thick_extrusion * s.thick_speed);
+      const std::size_t lines = std::max<std::size_t>(s.sweep.size(), 1);
+      for (std::size_t k = 0; k < lines; ++k) {
+        const auto thin = s.thin_of(static_cast<std::int64_t>(k));
+        rate = std::max(rate, thin.extrusion * thin.speed);
+      }
+    }
+    rate *=
+        bead_area(plan_.job.fill.all.width_mm, mm(thickest), material.shape()) * material.flow * machine.speed.print_mm_s / 1e4;
+    if (rate <= material.max_melt_mm3_s) return {};
+    return fmt::format(
+        "segmented lines take up to {:.2f} mm3/s, and the material melts at most {:g}: thin segments get too "
+        "little; give a slower --print-speed",
+        rate, material.max_melt_mm3_s);
+  }
   static void add(DepositedRange& range, const PoreCounts& pores, double area_mm2) {
     range.pores.add(pores);
     range.area_mm2 += area_mm2;
@@ -337,8 +365,15 @@ class FilamentObserver : public MoveObserver {
   void report(Summary& summary) const override {
     const formats::MoveTotals& totals = sums_.totals;
     const formats::FilamentUse use = formats::filament_use(totals, plan_.moves->profile.machine);
-    summary.results.emplace_back("filament",
-                                 fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, use.mm3 / 1000, use.grams));
+    const auto& material = plan_.moves->profile.machine.material;
+    std::string text = fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, use.mm3 / 1000, use.grams);
+    if (!material.name.empty()) text += fmt::format(" of {}", material.name);
+    summary.results.emplace_back("filament", text);
+    const double cost = use.grams / 1000 * material.price_kg;
+    if (material.price_kg > 0) {
+      summary.results.emplace_back(
+          "cost", fmt::format("{:.2f} {} of filament, {:g} per kg", cost, material.currency, material.price_kg));
+    }
     summary.results.emplace_back("printing", fmt::format("about {}", formats::gcode::time_text(totals.seconds)));
     Json& facts = summary.facts;
     facts["moves"] = totals.part_moves();
@@ -350,6 +385,11 @@ class FilamentObserver : public MoveObserver {
     facts["filament_mm"] = totals.filament_mm;
     facts["filament_mm3"] = use.mm3;
     facts["filament_g"] = use.grams;
+    if (!material.name.empty()) facts["material"] = material.name;
+    if (material.price_kg > 0) {
+      facts["filament_cost"] = cost;
+      facts["currency"] = material.currency;
+    }
     facts["skirt"] = {{"moves", totals.auxiliary_moves},
                       {"bead_mm", totals.auxiliary_mm},
                       {"volume_mm3", totals.auxiliary_mm3},

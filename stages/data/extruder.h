@@ -18,7 +18,8 @@ enum class BeadShape : std::uint8_t { kStadium, kRectangle, kEllipse };
 /// Everything that a profile says; what a job may change is changed here before anything is planned.
 struct Extruder {
   std::string name, description;
-  std::string format = "gcode";  // "gcode" or "sml"
+  std::string format = "gcode";                  // "gcode" or "sml"
+  double max_nozzle_degc = 0, max_bed_degc = 0;  // that the heaters reach; 0: not stated
 
   struct ExtruderBed {
     std::array<double, 2> size_mm{220, 220};
@@ -38,6 +39,10 @@ struct Extruder {
     double lag_s = 0;       // with which the melt follows its feed (stages/bead/line.h); 0: at once, or unknown
     double nozzle_degc = 200, bed_degc = 60;
     double first_nozzle_degc = 200, first_bed_degc = 60;  // while the first layer is extruded
+    std::string name;                                     // as "PETG"; empty: not stated
+    double price_kg = 0;                                  // in currency; 0: not stated
+    std::string currency = "EUR";                         // of price_kg
+    double max_melt_mm3_s = 0;                            // melted per second at most, which limits speeds; 0: not stated
 
     BeadShape shape() const { return bead_area.value_or(BeadShape::kStadium); }
     /// Volume extruded per millimetre of E, mm3.

@@ -38,6 +38,9 @@ void MoveTable::make(const PathInterval& s, MoveEntry& entry) const {
   entry.measured = bead_area(bead, height_, deposited);
   const double reference = s.kind == PathKind::kOuter ? wall_ : s.kind == PathKind::kInner ? inner_ : reference_;
   entry.speed = reference * speed / 100;
+  // Thick and thin segments need their speeds: those that exceed the rate give a warning (report/path_observers.cpp).
+  if (material.max_melt_mm3_s > 0 && s.thickness == Thickness::kReference)
+    entry.speed = std::min(entry.speed, material.max_melt_mm3_s / entry.area);
 }
 
 namespace {

@@ -69,6 +69,7 @@ const std::vector<WarningKind> kKinds = {
     {"undivided", "extrude peg.obj --set segment.thin_mm=20" + kSegmented},
     {"calibration", "extrude part.stl --machine marlin --layer 0.3 --fill segmented"},
     {"acceleration", "extrude part.stl --machine marlin --layer 0.3 --fill segmented", Page::kHasItNot},
+    {"melt-rate", "extrude part.stl --material tpu" + kSegmented, Page::kHasItNot},
     {"planned-again", "slice part.stl --layer 0.5 --resume --format 3mf", Page::kNone},
 };
 

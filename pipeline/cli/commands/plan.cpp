@@ -61,6 +61,10 @@ CommandSpec plan_spec(const PlanCommand& row) {
     machine->words = names_of(row.product == Product::kMoves ? shipped_extruders() : shipped_machines());
     if (row.product == Product::kMoves) machine->group = "Machine";
   }
+  if (const auto material = std::ranges::find(spec.options, "--material", &OptionSpec::flag);
+      material != spec.options.end() && row.product == Product::kMoves) {
+    material->words = names_of(shipped_materials());
+  }
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
   const bool rastered = row.product == Product::kImages;  // else no limit is known
@@ -288,9 +292,10 @@ const OptionSpec kExtrudeWords[] = {
 std::string extrude_closing() {
   std::string text = "Machines:\n";
   for (const ShippedProfile& shipped : shipped_extruders()) {
-    const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+    const auto profile = find_extruder(std::string(shipped.name));
     text += fmt::format("  {:<16}{}\n", shipped.name, profile ? profile->machine.description : "");
   }
+  text += fmt::format("\nMaterials:\n  {}\n", fmt::join(names_of(shipped_materials()), ", "));
   return text +
          "\nThe defaults are two walls, a grid of 20 % with solid tops and bottoms, and layers of half the nozzle diameter; for SML,\n"
          "the first thickness of its table. With --fill or --pattern: one wall, no solid tops. Lengths are mm, angles degrees.\n"
@@ -319,6 +324,7 @@ std::string extrude_ending(const Arguments& arguments) {
   Job job;
   if (arguments.has("--job")) static_cast<void>(read_job(arguments.text("--job"), job));  // the command reports errors
   if (arguments.has("--machine")) job.machine.profile = arguments.text("--machine");
+  job.extrude.material.clear();  // decides no format
   const auto profile = resolve_extruder(job);
   return profile && profile->machine.format == "sml" ? ".sml" : ".gcode";
 }

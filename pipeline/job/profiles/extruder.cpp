@@ -136,6 +136,8 @@ constexpr Key<Profile> kKeys[] = {
     custom<Profile, read_name, same_text, kMachine, &Extruder::name>({"machine", "name"}, Form::kString),
     custom<Profile, read_line, same_text, kMachine, &Extruder::description>({"machine", "description"}, Form::kString),
     text<check_format, kMachine, &Extruder::format>({"machine", "format"}),
+    field<kMachine, &Extruder::max_nozzle_degc>({"machine", "max_nozzle_degc"}, kNozzle).unsaid_at("0"),
+    field<kMachine, &Extruder::max_bed_degc>({"machine", "max_bed_degc"}, kPlate).unsaid_at("0"),
 
     field<kMachine, &Extruder::bed, &Bed::size_mm>({"bed", "size_mm"}, {1, kMaxMm, " mm"}),
     field<kMachine, &Extruder::bed, &Bed::build_height_mm>({"bed", "build_height_mm"}, {1, kMaxMm, " mm"}),
@@ -154,6 +156,12 @@ constexpr Key<Profile> kKeys[] = {
     field<kMachine, &Extruder::material, &Material::bed_degc>({"material", "bed_degc"}, kPlate),
     field<kMachine, &Extruder::material, &Material::first_nozzle_degc>({"material", "first_nozzle_degc"}, kNozzle),
     field<kMachine, &Extruder::material, &Material::first_bed_degc>({"material", "first_bed_degc"}, kPlate),
+    custom<Profile, read_line, same_text, kMachine, &Extruder::material, &Material::name>({"material", "name"}, Form::kString)
+        .unsaid_at(""),
+    field<kMachine, &Extruder::material, &Material::price_kg>({"material", "price_kg"}, {0, 1e6}).unsaid_at("0"),
+    text<check_currency, kMachine, &Extruder::material, &Material::currency>({"material", "currency"}).unsaid_at("EUR"),
+    field<kMachine, &Extruder::material, &Material::max_melt_mm3_s>({"material", "max_melt_mm3_s"}, {0, 1000, " mm3/s"})
+        .unsaid_at("0"),
 
     field<kMachine, &Extruder::speed, &Speed::print_mm_s>({"speed", "print_mm_s"}, kSpeed),
     field<kMachine, &Extruder::speed, &Speed::wall_mm_s>({"speed", "wall_mm_s"}, kSpeed),
@@ -230,7 +238,17 @@ std::string extruder_text(const ExtruderProfile& profile) {
   return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string& value) {
     if (key.name == "bead_area" && value.empty()) return false;
     if (key.name == "acceleration_mm_s2" && !profile.machine.speed.states_acceleration) return false;
+    // Older keys are always written: the manifest of a job has the hash of this text.
+    if (key.unsaid == value && key.section != "bed") return false;
     return key.section != "calibration" || profile.own_calibration;
+  });
+}
+
+std::string material_text(const ExtruderProfile& profile) {
+  constexpr Text kOfMachine[] = {"nozzle_mm", "bead_area", "flow", "feed_ratio", "lag_s"};
+  return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string& value) {
+    if (key.section == "fan") return true;
+    return key.section == "material" && std::ranges::find(kOfMachine, key.name) == std::end(kOfMachine) && key.unsaid != value;
   });
 }
 

@@ -52,6 +52,12 @@ struct Library::Chain {
   std::vector<std::string> id, where;
 };
 
+std::string check_currency(std::string_view text) {
+  const bool good =
+      !text.empty() && text.size() <= 8 && std::ranges::all_of(text, [](unsigned char c) { return c > ' ' && c != 127; });
+  return good ? std::string() : "is a short word without blanks, such as EUR";
+}
+
 std::vector<std::string_view> names_of(std::span<const ShippedProfile> profiles) {
   std::vector<std::string_view> names;
   for (const ShippedProfile& profile : profiles) names.push_back(profile.name);

@@ -86,6 +86,7 @@ inline std::string read_name(std::string_view text, std::string& name) {
 }
 inline std::string read_line(std::string_view text, std::string& line) { return line = one_line(text), std::string(); }
 inline std::string same_text(const std::string& text) { return text; }
+std::string check_currency(std::string_view text);
 
 /// Reads every section of a profile's files, at least one. name  of the machine; required
 /// errors  kUsage: place, key, reason

@@ -51,12 +51,6 @@ constexpr std::size_t kLongestMaterial = 40;
 
 std::string check_nothing(Text) { return {}; }
 
-std::string check_currency(Text text) {
-  const bool good =
-      !text.empty() && text.size() <= 8 && std::ranges::all_of(text, [](unsigned char c) { return c > ' ' && c != 127; });
-  return good ? std::string() : "is a short word without blanks, such as EUR";
-}
-
 std::string check_axis(Text text) {
   if (text.size() == 1 && text[0] >= 'A' && text[0] <= 'Z') return {};
   return fmt::format("'{}' is no axis; give one letter from A to Z", text);

@@ -37,6 +37,7 @@ Job unusual_job(const Directory& directory) {
   job.fill.all.gap_by_height = {{0, 0.75}, {6, 0.1}};
   job.fill.ranges = {{1, 2.5, changes_of("{ gap_mm = 0, pattern = 'contour' }")}, {3, 4, {}}};
   job.segment.ranges = {{0, 1.5, {}}};
+  job.extrude.material = directory / "own/resin.toml";
   job.extrude.machine = {{"bed.corner_mm", "-110,-110"}, {"fan.from_layer", "2"}};
   job.repair = false;
   job.drop_bad = true;

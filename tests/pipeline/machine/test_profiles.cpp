@@ -49,7 +49,7 @@ TEST(Profiles, OfPowderWithoutVoidsAreReportedByThatKey) {
 
 TEST(Profiles, ExtrusionPrintersReadBackTheSameAndHaveTheirCalibrationOrThePublishedOne) {
   for (const ShippedProfile& shipped : shipped_extruders()) {
-    const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+    const auto profile = find_extruder(std::string(shipped.name));
     ASSERT_TRUE(profile.ok()) << profile.error().message;
     EXPECT_FALSE(profile->calibration.by_speed.empty()) << shipped.name;
     const std::string text = pipeline::extruder_text(*profile);

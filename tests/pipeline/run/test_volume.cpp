@@ -98,7 +98,7 @@ TEST_F(Volume, GramsFilamentAndPorosityAreOneForEveryPrinterAndFilling) {
                                   "--fill segmented --extrusion 125 --continuous 2 --segment-rule thick-ends",
                                   "--fill segmented --pattern contour"};
   for (const ShippedProfile& shipped : shipped_extruders()) {
-    const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+    const auto profile = find_extruder(std::string(shipped.name));
     ASSERT_TRUE(profile.ok());
     for (const std::string& filling : fillings) {
       const bool sml = profile->machine.format == "sml";
