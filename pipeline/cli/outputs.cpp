@@ -26,13 +26,15 @@ struct InputOption {
 constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--machine", "the machine profile"},
                                    {"--preset", "a preset"},
+                                   {"--material", "a material"},
                                    {"--check", "a machine profile"},
                                    {"--show", "a machine profile"},
                                    {"--measured", "the measurements"},
                                    {"--measure", "a measured table"},
                                    {"--parts", "a part"},
                                    {"--scan", "a scan"},
-                                   {"--chart", "the chart"}};
+                                   {"--chart", "the chart"},
+                                   {"--import", "the profile"}};
 constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot",  "--target",
                                          "--solid",     "--void",     "--quote", "--overlay"};
 
@@ -58,6 +60,7 @@ constexpr OwnFile kOwnFiles[] = {
     {"calibrate", "-o,--output", false, {"Made by lamina calibrate."}},
     {"design", "-o,--output", false, {"Made by lamina design."}},
     {"machines", "--target", false, {"^orientation target"}},
+    {"machines", "-o,--output", true, {"^# Imported by lamina", "^# Made by lamina machines"}},
     {"stream", "-o,--output", true, {}},
 };
 /// Commands whose -o is a directory that they make, or may be.
@@ -236,6 +239,7 @@ Status check_outputs(const Arguments& arguments, const Job& job) {
   std::vector<InputFile> inputs = inputs_of(arguments, "a part");
   for (const PartRequest& part : job.parts) inputs.push_back({part.path, "a part"});
   inputs.push_back({job.machine.profile, "the machine profile"});
+  inputs.push_back({job.extrude.material, "a material"});
   for (const std::string& preset : job.machine.presets) inputs.push_back({preset, "a preset"});
   if (Status status = check_quote(arguments, job.output); !status) return status;
   std::vector<std::string> outputs = outputs_of(arguments);

@@ -123,6 +123,7 @@ class EveryOutput : public ::testing::Test {
     fs::copy(tests / ".." / "pipeline/machine/shipped/extruders/anet-a8.toml", directory_ / "printer.toml");
     write_text(directory_ / "widths.csv", kWidths);
     write_text(directory_ / "list.txt", "info part.stl\n");
+    write_text(directory_ / "filament.ini", "temperature = 200\n");
     for (const Row& row : rows_of(false)) {
       const std::string& line = row.call;
       const Outcome outcome = run(line);

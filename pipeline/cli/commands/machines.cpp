@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/made_profiles.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/report/machine_text.h"
@@ -33,6 +34,12 @@ CommandSpec machines_spec() {
       {"--preset", "NAME|FILE", "powder, binder and process preset; repeatable", "", "", names_of(shipped_presets())},
       {"--dialects", "", "list the dialects of print programs", "", ""},
       {"--target", "STL", "write a test part that shows the directions of x, y and z", "", ""},
+      {"--import", "FILE", "profile of PrusaSlicer (.ini), Orca or BambuStudio (.json)", "", ""},
+      {"--printer", "NAME", "printer of a PrusaSlicer bundle to import", "", ""},
+      {"--filament", "NAME", "filament of the bundle; default: the printer's", "", ""},
+      {"--plain-code", "", "replace code with conditions by lamina's", "", ""},
+      {"--new", "", "write a profile from answers on standard input", "", ""},
+      {"-o,--output", "FILE", "imported or new profile; default: standard output", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
   spec.closing =
       "Examples:\n"
@@ -40,7 +47,9 @@ CommandSpec machines_spec() {
       "  lamina machines --check nuferbj\n"
       "  lamina machines --show nuferbj > mine.toml\n"
       "  lamina machines --show jet1000 --preset example-steel       each value with the file that it comes from\n"
-      "  lamina jet part.stl --machine mine.toml -o out";
+      "  lamina jet part.stl --machine mine.toml -o out\n"
+      "  lamina machines --import Creality.ini --printer 'Creality Ender-3 (0.4 mm nozzle)' -o ender3.toml\n"
+      "  lamina extrude part.stl --machine ender3.toml -o part.gcode";
   return spec;
 }
 
@@ -144,6 +153,9 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
 /// A printer by name or file, first among powder printers, then extrusion: its profile or its derived values.
 /// errors  for an unknown name, those of powder printers
 Result<std::string> printer_text(const std::string& name, const std::vector<std::string>& presets, bool whole) {
+  for (const ShippedProfile& material : shipped_materials()) {
+    if (material.name == name) return std::string(material.text);
+  }
   const auto files = machine_files(name, presets);
   const Result<Machine> powder = files ? read_machine(*files) : files.error();
   if (!powder) {
@@ -160,6 +172,10 @@ Result<std::string> printer_text(const std::string& name, const std::vector<std:
 }
 
 Outcome run_machines(const Arguments& arguments, Context& context) {
+  if (arguments.has("--import") || arguments.has("--new")) return make_profile(arguments, context);
+  for (const char* flag : {"--printer", "--filament", "--plain-code", "-o,--output"}) {
+    if (arguments.has(flag)) return at_option(flag, "applies to --import; add it");
+  }
   const bool explains = arguments.has("--check") || arguments.has("--show") || !arguments.operands.empty();
   if (arguments.has("--preset") && !explains) return at_option("--preset", "applies to --check and --show; add one of them");
   if (arguments.has("--target") && (explains || arguments.has("--dialects")))
@@ -205,10 +221,12 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
     for (const std::string& name : library.own_names()) text += one_line(name) + "\n";
     text += "\nlamina extrude:\n";
     for (const ShippedProfile& shipped : shipped_extruders()) {
-      const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+      const auto profile = find_extruder(std::string(shipped.name));
       if (!profile) return profile.error();
       text += fmt::format("{:<16}{}\n", shipped.name, profile->machine.description);
     }
+    text += "\nlamina extrude --material:\n";
+    for (const ShippedProfile& shipped : shipped_materials()) text += fmt::format("{}\n", shipped.name);
   }
   return context.print(text);
 }

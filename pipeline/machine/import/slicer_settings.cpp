@@ -1,0 +1,44 @@
+#include "pipeline/machine/import/slicer_settings.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "stages/support/text/number_text.h"
+
+namespace lamina::pipeline {
+
+void SlicerSettings::update(const SlicerSettings& other) {
+  for (const auto& [key, setting] : other.setting_) setting_.insert_or_assign(key, setting);
+}
+
+std::optional<std::string> SlicerSettings::text(std::string_view key) {
+  const auto found = setting_.find(key);
+  if (found == setting_.end()) return std::nullopt;
+  found->second.used = true;
+  std::string text;
+  for (const std::string& value : found->second.values) text += (text.empty() ? "" : ",") + value;
+  return text;
+}
+
+std::optional<std::string> SlicerSettings::element(std::string_view key, std::size_t index) {
+  const auto whole = text(key);
+  if (!whole) return std::nullopt;
+  const auto elements = split(*whole, ",");
+  const std::string_view chosen = unquoted(trimmed(elements[index < elements.size() ? index : 0]));
+  if (chosen == "nil" || chosen.empty()) return std::nullopt;
+  return std::string(chosen);
+}
+
+std::vector<std::string> SlicerSettings::unused() const {
+  std::vector<std::string> keys;
+  for (const auto& [key, setting] : setting_) {
+    if (!setting.used) keys.push_back(key);
+  }
+  return keys;
+}
+
+std::string_view unquoted(std::string_view text) {
+  return text.size() >= 2 && text.front() == '"' && text.back() == '"' ? text.substr(1, text.size() - 2) : text;
+}
+
+}  // namespace lamina::pipeline
