@@ -36,7 +36,7 @@ CommandSpec machines_spec() {
       {"--target", "STL", "write a test part that shows the directions of x, y and z", "", ""},
       {"--import", "FILE", "profile of PrusaSlicer (.ini), Orca or BambuStudio (.json)", "", ""},
       {"--printer", "NAME", "printer of a PrusaSlicer bundle to import", "", ""},
-      {"--filament", "NAME", "filament of the bundle; default: the printer's", "", ""},
+      {"--filament", "NAME", "filament to import; default: the printer's", "", ""},
       {"--plain-code", "", "replace code with conditions by lamina's", "", ""},
       {"--new", "", "write a profile from answers on standard input", "", ""},
       {"-o,--output", "FILE", "imported or new profile; default: standard output", "", ""},

@@ -172,8 +172,9 @@ class ProfileImporter {
       return usage("{}: gcode_flavor = {}: lamina writes G-code for Marlin, RepRapFirmware, Repetier and Klipper", path_,
                    one_line(flavor));
     profile_.machine.code.flavor = found->second;
-    if (const auto relative = settings_.element("use_relative_e_distances"))
-      profile_.machine.code.relative_extrusion = *relative != "0" && *relative != "false";
+    // Absent: absolute in PrusaSlicer, relative in Orca (PrintConfig.cpp of both).
+    const auto relative = settings_.element("use_relative_e_distances").value_or(settings_.has("bed_shape") ? "0" : "1");
+    profile_.machine.code.relative_extrusion = relative != "0" && relative != "false";
     return {};
   }
 
@@ -240,13 +241,9 @@ class ProfileImporter {
 Result<ImportedProfile> import_profile(std::string_view text, const std::string& path, const ImportRequest& request) {
   const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
   const bool json = first != std::string_view::npos && text[first] == '{';
-  if (json) {
-    for (const auto& [flag, name] :
-         {std::pair{"--printer", &request.choice.printer}, {"--filament", &request.choice.filament}}) {
-      if (!name->empty()) return usage("{}: {} is one preset; leave it out", flag, path);
-    }
-  }
-  auto config = json ? read_orca_config(text.substr(first), path) : read_prusa_config(text, path, request.choice);
+  if (json && !request.choice.printer.empty()) return usage("--printer: {} is one preset; leave it out", path);
+  auto config = json ? read_orca_config(text.substr(first), path, request.choice.filament)
+                     : read_prusa_config(text, path, request.choice);
   return config ? ProfileImporter(std::move(*config), path, request).import() : config.error();
 }
 

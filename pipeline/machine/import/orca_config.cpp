@@ -96,12 +96,19 @@ class PresetFolder {
  private:
   Status list() {
     listed_ = true;
+    if (Status status = list(folder_); !status) return status;
+    std::error_code ignored;
+    const fs::path library = fs::absolute(folder_, ignored).lexically_normal().parent_path() / "OrcaFilamentLibrary";
+    return fs::is_directory(library, ignored) ? list(library) : Status();
+  }
+
+  Status list(const fs::path& folder) {
     std::error_code error;
     std::size_t count = 0;
-    for (fs::recursive_directory_iterator entry(folder_, fs::directory_options::skip_permission_denied, error), end;
+    for (fs::recursive_directory_iterator entry(folder, fs::directory_options::skip_permission_denied, error), end;
          !error && entry != end; entry.increment(error)) {
       if (++count > kMaxFolderEntries)
-        return usage("{}: has more than {} files; copy the preset and its bases into a folder of their own", folder_.string(),
+        return usage("{}: has more than {} files; copy the preset and its bases into a folder of their own", folder.string(),
                      kMaxFolderEntries);
       if (entry.depth() > 4) entry.disable_recursion_pending();
       std::error_code ignored;
@@ -141,7 +148,7 @@ class PresetReader {
     return {};
   }
 
-  /// Adds a preset that a machine names, if it is there; else a note. errors  of read_orca_config
+  /// Adds a preset that a machine names, if it and its bases are there; else a note. errors  of read_orca_config
   Status add_default(const std::string& name, std::string_view what, SlicerSettings& settings,
                      std::vector<std::string>& notes) {
     const Result<std::optional<std::string>> path = name.empty() ? std::optional<std::string>() : folder_.find(name);
@@ -151,6 +158,14 @@ class PresetReader {
                         ? fmt::format("the printer names no {}: the values are lamina's defaults", what)
                         : fmt::format("{} '{}' is not in its folders: the values are lamina's defaults", what, one_line(name)));
     return {};
+  }
+
+  /// Adds the filament that was requested. errors  of read_orca_config; no such file
+  Status add_requested(const std::string& name, SlicerSettings& settings) {
+    const auto path = folder_.find(name);
+    if (!path) return path.error();
+    if (!*path) return usage("--filament: no file '{}.json' in the folders of the printer", one_line(name));
+    return add_file(**path, settings);
   }
 
  private:
@@ -167,7 +182,7 @@ class PresetReader {
 
 }  // namespace
 
-Result<PrusaConfig> read_orca_config(std::string_view text, const std::string& path) {
+Result<PrusaConfig> read_orca_config(std::string_view text, const std::string& path, const std::string& filament) {
   const auto preset = parse_preset(text, path);
   if (!preset) return preset.error();
   const std::string type = member_text(*preset, "type");
@@ -175,16 +190,20 @@ Result<PrusaConfig> read_orca_config(std::string_view text, const std::string& p
     return usage("{}: is {}; name the preset of a machine or a filament", path,
                  type.empty() ? std::string("no preset of Orca or BambuStudio, which has a type")
                               : fmt::format("a preset of the type '{}'", one_line(type)));
+  if (type == "filament" && !filament.empty()) return usage("--filament: {} is a filament; leave it out", path);
   PrusaConfig config;
   config.name = one_line(member_text(*preset, "name"));
   PresetReader reader(path);
   SlicerSettings own;
   if (Status status = reader.add(*preset, path, own); !status) return status.error();
   if (type == "machine") {
-    for (const auto& [key, what] : {std::pair{"default_print_profile", "process"}, {"default_filament_profile", "filament"}}) {
-      const std::string name = own.element(key).value_or("");
-      if (Status status = reader.add_default(name, what, config.settings, config.notes); !status) return status.error();
-    }
+    const auto usual = [&](const char* key, const char* what) {
+      return reader.add_default(own.element(key).value_or(""), what, config.settings, config.notes);
+    };
+    if (Status status = usual("default_print_profile", "process"); !status) return status.error();
+    Status status =
+        filament.empty() ? usual("default_filament_profile", "filament") : reader.add_requested(filament, config.settings);
+    if (!status) return status.error();
   }
   config.settings.update(own);
   return config;

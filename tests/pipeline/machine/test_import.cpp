@@ -212,6 +212,10 @@ TEST(ImportedProfiles, OfOrcaFollowTheirBasesAndDefaults) {
   const auto filament = of("filament/Acme_PLA.json");
   ASSERT_TRUE(filament.ok());
   EXPECT_NE(filament->text.find("max_melt_mm3_s = 16"), std::string::npos) << filament->text;
+  const auto chosen = import_profile(folder + "machine/Acme_One_0.4.json", {{"", "Acme_PETG"}, false});
+  EXPECT_EQ(profile_of(chosen).machine.material.nozzle_degc, 245);
+  const auto unknown = import_profile(folder + "machine/Acme_One_0.4.json", {{"", "Acme_PVA"}, false});
+  expect_refused_as(unknown, Fault::kUsage, "--filament: no file 'Acme_PVA.json'");
   expect_refused_as(of("broken/circle.json"), Fault::kUsage, "goes round in a circle");
   expect_refused_as(of("broken/no_base.json"), Fault::kUsage, "no file 'nowhere.json'");
   expect_refused_as(of("process/0.20mm_Acme.json"), Fault::kUsage, "the type 'process'");
