@@ -204,7 +204,7 @@ constexpr Need kNeeds[] = {
 /// Options of what a printer that reads SML decides by itself: its files carry no heat, fans and speeds.
 constexpr std::string_view kOfGcode[] = {"--nozzle-temperature", "--bed-temperature", "--retraction", "--fan",
                                          "--relative-extrusion", "--print-speed",     "--wall-speed", "--first-layer-speed",
-                                         "--travel-speed"};
+                                         "--travel-speed",       "--material"};
 
 /// Whether a key has an effect on this product; images are filled by beads.
 bool decides_in(Product product, const JobKey& key, const Job& job) {
@@ -269,8 +269,7 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
   const bool intended =
       (arguments.has("--pattern") || arguments.has("--fill")) && job.fill.all.pattern == infill::Pattern::kNone;
   for (const Need& need : kNeeds) {
-    const bool beads =
-        need.met == deposits_lines || need.met == deposits_beads || need.met == turns_lines;
+    const bool beads = need.met == deposits_lines || need.met == deposits_beads || need.met == turns_lines;
     const auto met = study ? need.in_study : need.met;
     if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && intended)) continue;
     return at_option(need.flag, std::string(need.unmet));

@@ -104,6 +104,7 @@ TEST_F(MaterialCommands, NozzlesOfTheFdm2000HaveTheirThicknesses) {
        {std::pair{"fdm-2000", "0.178"}, {"fdm-2000-t10", "0.254"}, {"fdm-2000-t16", "0.305"}, {"fdm-2000-t16", "0.356"}})
     done(std::string("extrude part.stl --bead 0.508 --dry-run --machine ") + machine + " --layer " + layer);
   refused("extrude part.stl --bead 0.508 --dry-run --machine fdm-2000-t16 --layer 0.178", "0.254, 0.305, 0.356");
+  refused("extrude part.stl --dry-run --machine fdm-2000 --material abs", "--material: is not in SML");
   EXPECT_NE(done("machines --check fdm-2000-t10").out.find("nozzle    0.254 mm"), std::string::npos);
 }
 
@@ -125,6 +126,12 @@ TEST_F(MaterialCommands, AnImportedPrinterPrints) {
   refused("machines --import mine.ini --printer x", "--printer: mine.ini has the settings of one printer");
   refused("machines --import none.ini", "none.ini: no such file");
   refused("machines --import .", "is a directory");
+  write_text(directory_ / "huge.ini", "temperature = 200\n");
+  std::filesystem::resize_file(directory_ / "huge.ini", std::uintmax_t{1} << 34);
+  EXPECT_EQ(run("machines --import huge.ini").code, 2);
+  std::filesystem::remove(directory_ / "huge.ini");
+  EXPECT_NE(done("machines --show petg").out.find("name = \"PETG\""), std::string::npos);
+  EXPECT_NE(done("machines").out.find("\nlamina extrude --material:\nabs\nasa\npetg\npla\ntpu\n"), std::string::npos);
 }
 
 // run_lamina gives no input: the shell does.
