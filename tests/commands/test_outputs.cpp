@@ -207,6 +207,7 @@ TEST_F(Outputs, ATableOfHeightsGoesToStandardOutputByName) {
 TEST(OutputOptions, EveryOptionThatNamesAFileIsKnownAsReadOrWritten) {
   for (const pipeline::Command* command : pipeline::commands()) {
     for (const pipeline::OptionSpec& option : pipeline::spec_of(*command).options) {
+      if (command->name == "jet" && option.flag == "--material") continue;  // names of powders; of extrude a file
       const bool file =
           std::ranges::any_of(std::array{"FILE", "DIR", "HTML", "PNG", "STL", "OUT", "CSV", "PHOTO"},
                               [&](std::string_view word) { return option.value.find(word) != std::string::npos; });
