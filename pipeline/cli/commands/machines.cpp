@@ -48,8 +48,7 @@ CommandSpec machines_spec() {
       "  lamina machines --show nuferbj > mine.toml\n"
       "  lamina machines --show jet1000 --preset example-steel       each value with the file that it comes from\n"
       "  lamina jet part.stl --machine mine.toml -o out\n"
-      "  lamina machines --import Creality.ini --printer 'Creality Ender-3 (0.4 mm nozzle)' -o ender3.toml\n"
-      "  lamina extrude part.stl --machine ender3.toml -o part.gcode";
+      "  lamina machines --import bundle.ini --printer MINI -o mini.toml";
   return spec;
 }
 
