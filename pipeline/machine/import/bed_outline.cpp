@@ -45,7 +45,7 @@ Result<BedOutline> read_bed_outline(std::string_view text) {
     end[axis] = high[axis];
     bed.size_mm[axis] = high[axis] - low[axis];
   }
-  const auto& [x, y] = bed.corner_mm;
+  const double x = bed.corner_mm[0], y = bed.corner_mm[1];
   if (outline.size() < 3 || !(bed.size_mm[0] > 0) || !(bed.size_mm[1] > 0)) return usage("has no area");
   const auto is_corner = [&](const OutlinePoint& p) { return (p[0] == x || p[0] == end[0]) && (p[1] == y || p[1] == end[1]); };
   bed.rectangular = outline.size() >= 4 && std::ranges::all_of(outline, is_corner);
