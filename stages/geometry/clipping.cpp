@@ -79,10 +79,11 @@ Result<Contours> guarded(Act&& act) {
   return out;
 }
 
+constexpr const char* kFailed = "a difference or intersection failed";
+
 /// failure  what the error says
 Result<Contours> combine(const ContoursView& contours, const ContoursView& with, clip::ClipType how,
-                         clip::PolyFillType rule = clip::pftNonZero,
-                         const char* failure = "a difference or intersection failed", bool simple = true) {
+                         clip::PolyFillType rule = clip::pftNonZero, const char* failure = kFailed, bool simple = true) {
   if (contours.size() == 0) return Contours();
   return guarded([&](Contours& out) -> Status {
     const Point2 by = middle_of(contours);
@@ -227,12 +228,12 @@ Result<Contours> contour_union(const ContoursView& contours, FillRule rule, bool
   return combine(*region, {}, clip::ctUnion, type, "the union failed", simple);
 }
 
-Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less) {
-  return combine(contours, less, clip::ctDifference);
+Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less, bool simple) {
+  return combine(contours, less, clip::ctDifference, clip::pftNonZero, kFailed, simple);
 }
 
-Result<Contours> intersect_contours(const ContoursView& one, const ContoursView& other) {
-  return combine(one, other, clip::ctIntersection);
+Result<Contours> intersect_contours(const ContoursView& one, const ContoursView& other, bool simple) {
+  return combine(one, other, clip::ctIntersection, clip::pftNonZero, kFailed, simple);
 }
 
 Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance) {

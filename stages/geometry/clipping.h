@@ -20,10 +20,11 @@ Result<Contours> contour_union(const ContoursView& contours, FillRule rule, bool
 /// The region of clean contours less that of others, which may overlap each other: where they share an edge nothing is
 /// left of it. In the order of contour_union.
 /// errors  kInternal if Clipper refuses them
-Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less);
+/// simple  as contour_union
+Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less, bool simple = true);
 
 /// The region that two sets of clean contours share. As subtract_contours.
-Result<Contours> intersect_contours(const ContoursView& one, const ContoursView& other);
+Result<Contours> intersect_contours(const ContoursView& one, const ContoursView& other, bool simple = true);
 
 /// The region of clean contours grown by `distance` nm, shrunk where it is negative, as clean contours, each outer one followed
 /// by its holes; pieces that shrink away are gone. Straight edges keep their distance to within 1 nm of rounding. Corners that

@@ -117,6 +117,12 @@ Slicer Slicer::regrouped(std::span<const std::uint32_t> body_of) const {
   return other;
 }
 
+Slicer Slicer::exact() const {
+  Slicer other = *this;
+  other.options_.tolerance = 0;
+  return other;
+}
+
 void Slicer::group(std::span<const std::uint32_t> body_of) {
   bodies_ = 0;
   for (const std::uint32_t body : body_of)

@@ -80,6 +80,8 @@ class Slicer {
   /// the index; instances that only the other slicer cuts cost nothing here.
   static constexpr std::uint32_t kLeftOut = UINT32_MAX;
   Slicer regrouped(std::span<const std::uint32_t> body_of) const;
+  /// The same with all points of its contours. Shares the index.
+  Slicer exact() const;
 
   /// The contours of plane p. Pure: the same for any thread and order.
   /// errors  kInternal of the clipping library; kInput: instances overlap deeply and one winds backwards somewhere
