@@ -196,6 +196,7 @@ struct Job {
   bool inspect = false;                // detect islands, hollows and thin walls in the layers
   std::optional<double> min_wall_mm;   // what is narrower is thin; absent: two pixels, or a drop
   std::optional<double> min_drain_mm;  // powder does not leave through less; absent: 0.8
+  double support_angle_deg = 45;       // faces that are flatter hang; 0: vertical walls, 90: horizontal faces
   bool allow_empty = false;            // a whole job may have nothing
   bool allow_unbound = false;          // layers may get less binder than the machine's powder needs
   bool timing = false;                 // break down the run time

@@ -12,6 +12,8 @@
 
 namespace lamina {
 
+struct LayerOverhang;  // stages/data/overhang.h
+
 /// The print program of a layer, for a job with a machine.
 struct ProgramRecord {
   std::uint64_t bytes = 0;  // expanded, as the hash
@@ -53,6 +55,7 @@ struct PathFacts {
   DepositedSums deposited;
   /// By segmented range of heights, in a job whose layers can hold several; else empty, and not summed.
   std::vector<RangePores> by_range;
+  std::shared_ptr<const LayerOverhang> overhang;  // null of layers that an earlier run made; in no manifest, and not summed
 
   /// Sums the fields. Summed in layer order, the result is deterministic.
   void add(const PathFacts& other) {

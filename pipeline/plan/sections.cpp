@@ -142,6 +142,10 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
     if (Status status = made.make_own_slicers(job, body); !status) return status.error();
   }
   made.keep_neighbours(0);
+  if (tolerance > 0) {
+    for (const slice::Slicer& own : made.own_slicers_) made.exact_slicers_.push_back(own.exact());
+    if (made.own_slicers_.empty()) made.exact_slicers_.push_back(made.slicer_->exact());
+  }
   return made;
 }
 
@@ -255,7 +259,7 @@ void Sections::Scratches::give_back(std::unique_ptr<slice::SectionScratch> scrat
   idle.push_back(std::move(scratch));
 }
 
-Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled,
+Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Nm tolerance,
                                                slice::SectionScratch& scratch, Work& work, slice::LayerContours& out) const {
   auto report = slicer.layer(scheduled.low, scratch, out);
   if (!report || containment_ == Containment::kAcross) return report;
@@ -279,7 +283,7 @@ Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, cons
     }
     if (!region) return region.error();
     order_by_outer(*region);
-    simplify(*region, tolerance_, scratch.simplify);
+    simplify(*region, tolerance, scratch.simplify);
     both.contours.append(*region);
     both.body.push_back(both.contours.size());
   }
@@ -296,14 +300,14 @@ Status Sections::slice_layer(std::uint32_t index, slice::SectionScratch& scratch
     work.contours = (*shared)->contours;
     work.report = (*shared)->report;
   } else {
-    auto report = section(slicer, scheduled, scratch, work, work.contours);
+    auto report = section(slicer, scheduled, tolerance_, scratch, work, work.contours);
     if (!report) return report.error();
     // Bodies of other parts have nothing in this layer.
     work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
     work.report = *report;
   }
   if (!part_slicer_) return {};
-  const auto again = section(*part_slicer_, scheduled, scratch, work, work.parts);
+  const auto again = section(*part_slicer_, scheduled, tolerance_, scratch, work, work.parts);
   return again ? Status() : Status(again.error());
 }
 
@@ -314,7 +318,18 @@ void Sections::keep_neighbours(std::uint32_t layers) {
   neighbours_->contours.reserve(layers + 2 * reach + 2);
 }
 
-std::uint64_t Sections::shared_bytes() const { return neighbours_->contours.bytes(); }
+void Sections::keep_exact_neighbours(std::uint32_t layers) {
+  NearbyLayers& nearby = exact_slicers_.empty() ? *neighbours_ : *exact_neighbours_;
+  nearby.used = true;
+  nearby.contours.reserve(layers);
+}
+
+std::uint64_t Sections::shared_bytes() const { return neighbours_->contours.bytes() + exact_neighbours_->contours.bytes(); }
+
+double Sections::sampled_at(std::uint32_t index) const {
+  const ScheduledLayer& scheduled = schedule_.layers[index];
+  return (static_cast<double>(schedule_.planes[scheduled.low]) + schedule_.planes[scheduled.high]) / 2;
+}
 
 std::optional<std::uint32_t> Sections::above(std::uint32_t index) const {
   for (std::uint32_t next = index + 1; next < schedule_.layers.size(); ++next) {
@@ -337,13 +352,23 @@ Result<std::shared_ptr<const Sections::SharedContours>> Sections::shared_contour
   return shared;
 }
 
-Result<std::shared_ptr<const Sections::SharedContours>> Sections::share(std::uint32_t index,
-                                                                        slice::SectionScratch& scratch) const {
-  return neighbours_->contours.get(index, [&]() -> Result<SharedContours> {
+Result<std::shared_ptr<const Sections::SharedContours>> Sections::exact_contours(std::uint32_t index) const {
+  auto scratch = scratches_->take();
+  auto shared = share(index, *scratch, !exact_slicers_.empty());
+  scratches_->give_back(std::move(scratch));
+  return shared;
+}
+
+Result<std::shared_ptr<const Sections::SharedContours>> Sections::share(std::uint32_t index, slice::SectionScratch& scratch,
+                                                                        bool exact) const {
+  NearbyLayers& nearby = exact ? *exact_neighbours_ : *neighbours_;
+  return nearby.contours.get(index, [&]() -> Result<SharedContours> {
     Work work;
     const ScheduledLayer& scheduled = schedule_.layers[index];
-    const slice::Slicer& slicer = own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part];
-    const auto report = section(slicer, scheduled, scratch, work, work.contours);
+    const slice::Slicer& slicer = exact                  ? exact_slicers_[own_slicers_.empty() ? 0 : scheduled.part]
+                                  : own_slicers_.empty() ? *slicer_
+                                                         : own_slicers_[scheduled.part];
+    const auto report = section(slicer, scheduled, exact ? 0 : tolerance_, scratch, work, work.contours);
     if (!report) return report.error();
     // Bodies of other parts have nothing in this layer.
     work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());

@@ -83,7 +83,13 @@ class Sections {
   Result<std::shared_ptr<const SharedContours>> shared_contours(std::uint32_t index) const;
   /// Keeps the neighbours of so many layers at a time for skins; 0 to begin with. Before the first layer.
   void keep_neighbours(std::uint32_t layers);
+  /// The same with all points, regardless of the tolerance; keep_exact_neighbours() sets how many are kept.
+  Result<std::shared_ptr<const SharedContours>> exact_contours(std::uint32_t index) const;
+  void keep_exact_neighbours(std::uint32_t layers);
+  /// Bytes of both that are kept.
   std::uint64_t shared_bytes() const;
+  /// nm: the plane of a layer, or the middle of both.
+  double sampled_at(std::uint32_t index) const;
   /// The layer that is printed on layer `index` of the same part, and the one that it is printed on; none at the ends.
   std::optional<std::uint32_t> above(std::uint32_t index) const;
   std::optional<std::uint32_t> below(std::uint32_t index) const;
@@ -133,20 +139,24 @@ class Sections {
     void give_back(std::unique_ptr<slice::SectionScratch> scratch);
   };
 
-  /// What layers need of each other.
-  struct Neighbours {
+  /// Contours of the last layers, of any thread.
+  struct NearbyLayers {
     bool used = false;
     LayerCache<SharedContours> contours;
   };
 
-  Sections() : scratches_(std::make_unique<Scratches>()), neighbours_(std::make_unique<Neighbours>()) {}
+  Sections()
+      : scratches_(std::make_unique<Scratches>()),
+        neighbours_(std::make_unique<NearbyLayers>()),
+        exact_neighbours_(std::make_unique<NearbyLayers>()) {}
   std::unique_ptr<Scratches> scratches_;
-  std::unique_ptr<Neighbours> neighbours_;
+  std::unique_ptr<NearbyLayers> neighbours_, exact_neighbours_;
   const Scene* scene_ = nullptr;
   LayerSchedule schedule_;
   Containment containment_ = Containment::kAcross;
   std::optional<slice::Slicer> slicer_;
-  std::vector<slice::Slicer> own_slicers_;  // by part, if each has its own layers
+  std::vector<slice::Slicer> own_slicers_;    // by part, if each has its own layers
+  std::vector<slice::Slicer> exact_slicers_;  // the same or one, without a tolerance; none if there is none anyway
   std::vector<std::string> names_;
   std::vector<std::uint32_t> body_;  // by instance
   std::vector<FillPlan> plans_;      // by [[part]]
@@ -154,13 +164,14 @@ class Sections {
   std::vector<std::uint32_t> body_area_;      // bodies + 1, into areas_
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling
   Status slice_layer(std::uint32_t index, slice::SectionScratch& scratch, Work& work) const;
-  Result<std::shared_ptr<const SharedContours>> share(std::uint32_t index, slice::SectionScratch& scratch) const;
+  Result<std::shared_ptr<const SharedContours>> share(std::uint32_t index, slice::SectionScratch& scratch,
+                                                      bool exact = false) const;
   std::uint32_t skin_reach() const;
   Status keep_covered(std::uint32_t index, const Area& area, Contours& region) const;
   Status divide_skins(std::uint32_t index, const Area& area, infill::Outlines& outlines) const;
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
-  Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled,
+  Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Nm tolerance,
                                        slice::SectionScratch& scratch, Work& work, slice::LayerContours& out) const;
   void find_copies(const std::vector<std::uint32_t>& body);
   bool is_moved(const Area& copy, const Area& original, const Work& work) const;

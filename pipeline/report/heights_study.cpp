@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "pipeline/report/overhang_observer.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
@@ -292,6 +293,8 @@ std::string study_json(const StudiedParts& parts, const std::vector<Study>& stud
                   {"largest_miss_mm", mm(e.largest_miss)}};
     if (study.plan.small_peaks > 0) table["small_peaks"] = study.plan.small_peaks;
     if (study.plan.one_less_reaches >= 0) table["one_less_reaches_mm"] = mm(study.plan.one_less_reaches);
+    if (!parts.overhangs.empty())
+      table["overhangs"] = overhangs_json(parts.overhangs[all["tables"].size()], parts.support_angle_deg);
     if (e.seconds > 0) table["seconds"] = rounded(e.seconds, 3);
     table["flat"] = Json::array();
     table["layer"] = Json::array();
@@ -318,20 +321,24 @@ std::string study_json(const StudiedParts& parts, const std::vector<Study>& stud
   return json_line(all);
 }
 
-std::string comparison_page(const std::vector<Study>& studies) {
+std::string comparison_page(const StudiedParts& parts, const std::vector<Study>& studies) {
   const Study& first = studies.front();
   const double whole = first.evaluation.seconds;
   const bool saves = first.options.estimates_time;  // in addition to the first
-  std::string text = fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step",
-                                 "mean step", "flats missed", "largest miss", "top",
-                                 saves       ? "        time    saved"
-                                 : whole > 0 ? "        time"
-                                             : "");
+  std::string text =
+      fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}{}\n", "way", "layers", "largest step", "mean step",
+                  "flats missed", "largest miss", "top", parts.overhangs.empty() ? "" : "    overhangs",
+                  saves       ? "        time    saved"
+                  : whole > 0 ? "        time"
+                              : "");
   for (const Study& study : studies) {
     const Evaluation& e = study.evaluation;
     text += fmt::format("{:<24} {:>7} {:>9.4f} mm {:>7.4f} mm {:>12} {:>9.4f} mm {:>+7.3f} mm", study.name, study.layers(),
                         mm(e.largest_cusp), e.mean_cusp * 1e-6, fmt::format("{} of {}", e.flats_missed, e.flats.size()),
                         mm(e.largest_miss), mm(e.top_miss));
+    if (!parts.overhangs.empty()) {
+      text += fmt::format(" {:>8.1f} mm2", parts.overhangs[static_cast<std::size_t>(&study - studies.data())].area_mm2());
+    }
     if (whole > 0) text += fmt::format(" {:>11}", readable_seconds(e.seconds));
     if (saves) text += fmt::format(" {:>6.1f} %", 100 * (1 - e.seconds / whole));
     text += '\n';

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "stages/checks/overhang_tally.h"
 #include "stages/data/mesh.h"
 #include "stages/data/plot.h"
 #include "stages/heights/evaluate.h"
@@ -24,6 +25,8 @@ struct StudiedParts {
   std::int64_t height = 0;         // nm, of all
   std::string way;                 // how layers are decided: "of 0.1..0.3 mm, optimal"
   double cusp_limit_mm = 0;
+  std::vector<checks::OverhangTally> overhangs;  // of each table; empty if they are not sliced
+  double support_angle_deg = 0;
 };
 
 /// The reason for a layer; "given" for a given table.
@@ -37,7 +40,7 @@ std::string study_csv(const StudiedParts& parts, const std::vector<heights::Stud
 /// One JSON object on a line.
 std::string study_json(const StudiedParts& parts, const std::vector<heights::Study>& studies);
 /// One line per study.
-std::string comparison_page(const std::vector<heights::Study>& studies);
+std::string comparison_page(const StudiedParts& parts, const std::vector<heights::Study>& studies);
 
 /// title  of the parts
 /// errors  none

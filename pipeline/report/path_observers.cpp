@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pipeline/plan/layers.h"
+#include "pipeline/report/overhang_observer.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/formats/gcode/write_gcode.h"
 #include "stages/geometry/bead_section.h"
@@ -409,6 +410,7 @@ void observe_contours(const Plan& plan, Observers<slice::SectionReport>& observe
   observers.add<GapObserver>();
   observers.add<OffsetObserver>(plan);
   observers.add<FillingObserver>(plan);
+  observers.add<OverhangObserver<slice::SectionReport>>(plan.job.support_angle_deg);
 }
 
 bool has_ranges_by_layer(const Plan& plan) {
@@ -423,6 +425,7 @@ void observe_moves(const Plan& plan, const PathFacts& sums, Observers<void>& obs
   observers.add<BeadObserver>(plan, sums);
   observers.add<SegmentObserver>(plan, sums);
   observers.add<FilamentObserver>(plan, sums);
+  observers.add<OverhangObserver<void>>(plan.job.support_angle_deg);
 }
 
 void report_move_plan(const Plan& plan, Summary& summary) {

@@ -9,6 +9,7 @@
 #include "pipeline/output/slice_files.h"
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/plan/layers.h"
+#include "pipeline/plan/overhangs.h"
 #include "pipeline/plan/segment.h"
 #include "pipeline/report/path_observers.h"
 #include "stages/bead/even_starts.h"
@@ -175,10 +176,29 @@ Result<bool> deposit_moves(const Plan& plan, std::uint32_t index, const Sections
   return true;
 }
 
+/// Layers whose contours are kept for the layer above: those in flight and the one below.
+std::uint32_t neighbours_of(const FlowLimits& limits) { return limits.max_in_flight + 2; }
+
+/// The step that finds what hangs in a layer.
+MakerStep overhang_step(const Overhangs& overhangs, std::vector<std::shared_ptr<const LayerOverhang>>& found) {
+  return {"overhangs", [&](std::uint32_t layer, const Ticket& ticket) -> Status {
+            auto made = overhangs.at(layer);
+            if (!made) return made.error();
+            found[ticket.work] = std::make_shared<const LayerOverhang>(std::move(*made));
+            return {};
+          }};
+}
+
 class ContourMaker : public Maker {
  public:
   ContourMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
-      : plan_(plan), checks_(checks), files_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
+      : plan_(plan),
+        checks_(checks),
+        files_(plan),
+        work_(limits.max_in_flight),
+        made_(limits.max_in_flight),
+        overhangs_(*plan.sections, plan.job.support_angle_deg, neighbours_of(limits)),
+        overhang_(limits.max_in_flight) {
     plan.sections->keep_neighbours(limits.max_in_flight);
     observe_contours(plan, observers_);
   }
@@ -201,6 +221,7 @@ class ContourMaker : public Maker {
                made_[ticket.work].layer = plan_.layer(layer);
                return sections.contours(layer, work_[ticket.work]);
              }},
+            overhang_step(overhangs_, overhang_),
             {"fill", [&](std::uint32_t layer, const Ticket& ticket) { return sections.fill(layer, work_[ticket.work]); },
              [&](std::uint32_t layer, const Ticket& ticket) {
                return sections.fill_bytes_bound(layer, work_[ticket.work], files_.text_bytes());
@@ -210,6 +231,7 @@ class ContourMaker : public Maker {
                Sections::Work& work = work_[ticket.work];
                PathFacts facts = facts_of(work);
                facts.bead_mm = length_mm(work.paths);
+               facts.overhang = overhang_[ticket.work];
                facts.area_mm2 = checks_.add_contours(made_[ticket.work].layer, work.contours);
                made_[ticket.work].paths = std::make_shared<const PathFacts>(facts);
                Status encoded = files_.encode(view_of(made_[ticket.work].layer, work), work.text);
@@ -279,6 +301,8 @@ class ContourMaker : public Maker {
   SliceFiles files_;
   std::vector<Sections::Work> work_;
   std::vector<LayerRecord> made_;
+  Overhangs overhangs_;
+  std::vector<std::shared_ptr<const LayerOverhang>> overhang_;
   Observers<slice::SectionReport> observers_;
   std::uint64_t bytes_written_ = 0;
 };
@@ -292,7 +316,13 @@ constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 class MoveMaker : public Maker {
  public:
   MoveMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
-      : plan_(plan), checks_(checks), file_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
+      : plan_(plan),
+        checks_(checks),
+        file_(plan),
+        work_(limits.max_in_flight),
+        made_(limits.max_in_flight),
+        overhangs_(*plan.sections, plan.job.support_angle_deg, neighbours_of(limits)),
+        overhang_(limits.max_in_flight) {
     plan.sections->keep_neighbours(limits.max_in_flight);
     observe_moves(plan, sums_, observers_);
   }
@@ -316,6 +346,7 @@ class MoveMaker : public Maker {
            made_[ticket.work].record.layer = plan_.layer(layer);
            return plan_.sections->contours(layer, work_[ticket.work]);
          }},
+        overhang_step(overhangs_, overhang_),
         {"fill", [this](std::uint32_t layer, const Ticket& ticket) { return plan_.sections->fill(layer, work_[ticket.work]); },
          [this](std::uint32_t layer, const Ticket& ticket) {
            auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {kTextOfPoint, 0, kTextOfPath});
@@ -336,6 +367,7 @@ class MoveMaker : public Maker {
       if (Status status = deposit_pieces(layer, work, made); !status) return status;
     }
     file_.travel_from(sums_.totals, made.facts.totals);
+    made.facts.overhang = overhang_[ticket.work];
     made.record.paths = std::make_shared<const PathFacts>(made.facts);
     const std::string_view text(work.text.data(), work.text.size());
     if (Status status = made.waits ? file_.file().append(text, made.record) : file_.file().end_pieces(made.record); !status)
@@ -425,6 +457,8 @@ class MoveMaker : public Maker {
   ToolpathFile file_;
   std::vector<Sections::Work> work_;
   std::vector<Made> made_;
+  Overhangs overhangs_;
+  std::vector<std::shared_ptr<const LayerOverhang>> overhang_;
   Buffer<char> piece_;
 
   PathFacts sums_;

@@ -49,11 +49,18 @@ void append_reversed(std::span<const Point2> contour, Contours& to) {
   to.close();
 }
 
+}  // namespace
+
+PlanarBox grown(const PlanarBox& box, std::int64_t by) {
+  const auto moved = [](Nm v, std::int64_t by_nm) {
+    return static_cast<Nm>(std::clamp<std::int64_t>(v + by_nm, -kNmReach, kNmReach));
+  };
+  return {{moved(box.lo.x, -by), moved(box.lo.y, -by)}, {moved(box.hi.x, by), moved(box.hi.y, by)}};
+}
+
 bool is_within(const PlanarBox& inner, const PlanarBox& outer) {
   return outer.lo.x <= inner.lo.x && inner.hi.x <= outer.hi.x && outer.lo.y <= inner.lo.y && inner.hi.y <= outer.hi.y;
 }
-
-}  // namespace
 
 PlanarBox box_around(std::span<const Point2> points) {
   PlanarBox box;
@@ -192,12 +199,11 @@ Contours wide_gaps(const RegionBelow& below, const ContoursView& own, std::int64
     const PlanarBox& box = below.box[c];
     if (std::min(std::int64_t{box.hi.x} - box.lo.x, std::int64_t{box.hi.y} - box.lo.y) <= 2 * reach) continue;
     if (doubled_area(points) >= 0) continue;
-    const auto by = static_cast<Nm>(std::min<std::int64_t>(reach, kNmReach));
-    const PlanarBox larger{{box.lo.x - by, box.lo.y - by}, {box.hi.x + by, box.hi.y + by}};
+    const PlanarBox larger = grown(box, reach);
     const auto island = [&](const PlanarBox& other) { return is_within(other, larger); };
     bool open = above.has(points);
     for (auto it = std::ranges::lower_bound(by_left, larger.lo.x, {}, left); !open && it != by_left.end(); ++it) {
-      if (left(*it) > box.lo.x + std::int64_t{by}) break;
+      if (left(*it) > box.lo.x + reach) break;
       open = stays_open(points, box, own[*it], above.box[*it], reach);
     }
     if (open && std::ranges::none_of(islands, island)) continue;
@@ -269,6 +275,7 @@ Status RegionBelow::prepare(const ContoursView& below, const ContoursView& own, 
   contours = below;
   box.clear();
   uncarried.clear();
+  uncarried_box.clear();
   by_start.clear();
   for (std::uint32_t c = 0; c < below.size(); ++c) {
     box.push_back(box_around(below[c]));
@@ -282,20 +289,28 @@ Status RegionBelow::prepare(const ContoursView& below, const ContoursView& own, 
   const auto rest = offset_contours(gaps, -reach);
   if (!rest) return rest.error();
   for (std::uint32_t c = 0; c < rest->size(); ++c) {
-    if (doubled_area((*rest)[c]) > 0) uncarried.push_back((*rest)[c].front());
+    if (doubled_area((*rest)[c]) <= 0) continue;
+    uncarried.push_back((*rest)[c].front());
+    uncarried_box.push_back(box_around((*rest)[c]));
   }
   return {};
 }
 
-bool is_carried(const ContoursView& component, const RegionBelow& below, std::int64_t reach) {
+void find_uncarried(const ContoursView& component, const RegionBelow& below, std::int64_t reach,
+                    std::vector<PlanarBox>& boxes) {
   for (std::uint32_t c = 0; c < component.size(); ++c) {
     const std::span<const Point2> points = component[c];
     if (below.has(points)) continue;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!below.bands.carries(points[i], points[i + 1 < points.size() ? i + 1 : 0], static_cast<double>(reach))) return false;
+      const Point2 a = points[i], b = points[i + 1 < points.size() ? i + 1 : 0];
+      if (below.bands.carries(a, b, static_cast<double>(reach))) continue;
+      PlanarBox& box = boxes.emplace_back();
+      box.add(a), box.add(b);
     }
   }
-  return std::ranges::none_of(below.uncarried, [&](Point2 p) { return is_inside(component, p); });
+  for (std::size_t i = 0; i < below.uncarried.size(); ++i) {
+    if (is_inside(component, below.uncarried[i])) boxes.push_back(below.uncarried_box[i]);
+  }
 }
 
 }  // namespace lamina::checks

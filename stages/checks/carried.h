@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <vector>
 
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
@@ -17,6 +18,10 @@ namespace lamina::checks {
 /// Box of contours or edges, nm.
 struct PlanarBox {
   Point2 lo{INT32_MAX, INT32_MAX}, hi{INT32_MIN, INT32_MIN};
+  void add(const PlanarBox& other) {
+    lo = {std::min(lo.x, other.lo.x), std::min(lo.y, other.lo.y)};
+    hi = {std::max(hi.x, other.hi.x), std::max(hi.y, other.hi.y)};
+  }
   void add(Point2 p) {
     lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
     hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
@@ -26,6 +31,9 @@ struct PlanarBox {
     return lo.x - by <= other.hi.x && other.lo.x <= hi.x + by && lo.y - by <= other.hi.y && other.lo.y <= hi.y + by;
   }
 };
+/// Larger by `by` nm, within the reach of coordinates.
+PlanarBox grown(const PlanarBox& box, std::int64_t by);
+bool is_within(const PlanarBox& inner, const PlanarBox& outer);
 PlanarBox box_around(std::span<const Point2> points);
 
 /// Edges of contours in horizontal bands.
@@ -63,6 +71,7 @@ struct RegionBelow {
   Buffer<PlanarBox> box;           // of each contour
   Buffer<std::uint32_t> by_start;  // contours by their first points
   Buffer<Point2> uncarried;        // a point of each piece of its holes that is beyond the reach
+  Buffer<PlanarBox> uncarried_box;
   EdgeBands bands;
 
   /// own  the contours above; a hole that is in both, without an island, cannot hang. reach  nm. errors  of offset_contours
@@ -75,9 +84,10 @@ struct RegionBelow {
 /// Whether a component, an outer contour and its holes, certainly shares area with the region below. false: it may not.
 bool shares_area(const ContoursView& component, const RegionBelow& below);
 
-/// Whether a component is certainly nowhere beyond the reach that the region was prepared with. false: it may hang.
+/// Appends boxes of what may be beyond the reach that the region was prepared with: of edges, and of pieces of holes below. All
+/// that is beyond it is connected to one of them, within the component. None: the component is carried.
 /// cost  O(P) times the edges of a band
-bool is_carried(const ContoursView& component, const RegionBelow& below, std::int64_t reach);
+void find_uncarried(const ContoursView& component, const RegionBelow& below, std::int64_t reach, std::vector<PlanarBox>& boxes);
 
 /// A point of a component: the middle of its longest chord half-way up.
 Point2 point_within(const ContoursView& component);

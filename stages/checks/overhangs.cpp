@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "stages/geometry/box_clip.h"
 #include "stages/geometry/clipping.h"
 
 namespace lamina::checks {
@@ -29,42 +30,114 @@ std::uint32_t end_of_component(const ContoursView& all, std::uint32_t begin) {
   return end;
 }
 
-/// The contours below that a component can meet once they grow.
-Contours below_component(const ContoursView& component, const RegionBelow& below, std::int64_t reach) {
-  const PlanarBox around = box_around(component[0]);
+/// The contours below that components can meet once they grow.
+Contours below_components(const ContoursView& components, const RegionBelow& below, std::int64_t reach) {
+  std::vector<PlanarBox> boxes;
+  for (std::uint32_t c = 0; c < components.size(); ++c)
+    if (doubled_area(components[c]) > 0) boxes.push_back(box_around(components[c]));
   Contours met;
   for (std::uint32_t c = 0; c < below.contours.size(); ++c) {
-    if (!below.box[c].meets(around, 2 * reach + kRounding)) continue;
+    const auto meets = [&](const PlanarBox& box) { return below.box[c].meets(box, 2 * reach + kRounding); };
+    if (std::ranges::none_of(boxes, meets)) continue;
     met.point.insert(met.point.end(), below.contours[c].begin(), below.contours[c].end());
     met.close();
   }
   return met;
 }
 
-/// Appends what hangs of a component. shares  whether it certainly shares area with the region below
-Status append_hanging(const ContoursView& component, const RegionBelow& below, std::int64_t reach, bool shares, Contours& out) {
-  const Contours met = below_component(component, below, reach);
-  if (!shares) {
-    const auto fresh = subtract_contours(component, met, false);
-    if (!fresh) return fresh.error();
-    if (doubled_area(*fresh) == doubled_area(component)) {
-      out.append(component);
-      return {};
+/// Whether a component shares no area with the region below. errors  of subtract_contours
+Result<bool> is_separate(const ContoursView& component, const RegionBelow& below) {
+  const auto fresh = subtract_contours(component, below_components(component, below, 0), false);
+  if (!fresh) return fresh.error();
+  return doubled_area(*fresh) == doubled_area(component);
+}
+
+/// A part of the layer in which boolean operations are made, and what hangs in it.
+struct Extract {
+  PlanarBox box;
+  Contours hanging;
+  bool done = false;
+};
+
+/// Joins boxes until no two meet.
+void join_boxes(std::vector<Extract>& extracts) {
+  for (std::size_t i = 0; i < extracts.size(); ++i) {
+    for (std::size_t k = 0; k < extracts.size();) {
+      if (k == i || !extracts[i].box.meets(extracts[k].box)) {
+        ++k;
+        continue;
+      }
+      extracts[i].box.add(extracts[k].box);
+      extracts[i].done = false;
+      extracts.erase(extracts.begin() + static_cast<std::ptrdiff_t>(k));
+      if (k < i) --i;
+      k = 0;
     }
   }
-  const auto carrying = offset_contours(met, certain(reach));
+}
+
+Contours part_in(const ContoursView& contours, const PlanarBox& box) {
+  Contours part;
+  clip_to_box(contours, box.lo, box.hi, part);
+  return part;
+}
+
+/// Finds what hangs in an extract of components that share area with the region below. Where it reaches the sides, the box
+/// becomes larger instead. all  the box around the components
+Status extract_hanging(const ContoursView& components, const ContoursView& met, std::int64_t reach, const PlanarBox& all,
+                       Extract& extract) {
+  const std::int64_t margin = 2 * reach + 8 * kRounding;  // corners of offsets are at most twice the distance away
+  const PlanarBox around_box = grown(extract.box, 2 * margin);
+  const Contours own = part_in(components, extract.box), below = part_in(met, around_box);
+  const auto carrying = offset_contours(below, certain(reach));
   if (!carrying) return carrying.error();
-  const auto far = subtract_contours(component, *carrying, false);
+  const auto far = subtract_contours(own, *carrying, false);
   if (!far) return far.error();
+  extract.done = true;
   if (far->size() == 0) return {};
+  const PlanarBox needed = grown(box_around(far->point), margin);
+  if (!is_within(needed, extract.box) && !is_within(all, extract.box)) {
+    extract.done = false;
+    extract.box.add(needed);
+    const std::int64_t size =
+        std::max(std::int64_t{extract.box.hi.x} - extract.box.lo.x, std::int64_t{extract.box.hi.y} - extract.box.lo.y);
+    extract.box = grown(extract.box, std::max(margin, size / 4));
+    return {};
+  }
   const auto around = offset_contours(*far, reach + 2 * kRounding);
   if (!around) return around.error();
   // In this order only edges that are next to what hangs are compared with those below, which they may nearly coincide with.
-  const auto near = intersect_contours(component, *around, false);
+  const auto near = intersect_contours(own, *around, false);
   if (!near) return near.error();
-  const auto hanging = subtract_contours(*near, met, false);
+  auto hanging = subtract_contours(*near, below, false);
   if (!hanging) return hanging.error();
-  out.append(*hanging);
+  extract.hanging = std::move(*hanging);
+  return {};
+}
+
+/// Appends what hangs of components that share area with the region below.
+/// uncarried  boxes, all that is beyond the reach is connected to one of them
+Status append_hanging(const ContoursView& components, const RegionBelow& below, std::int64_t reach,
+                      const std::vector<PlanarBox>& uncarried, Contours& out) {
+  const Contours met = below_components(components, below, reach);
+  std::vector<Extract> extracts;
+  for (const PlanarBox& box : uncarried) {
+    const PlanarBox larger = grown(box, 3 * reach + 16 * kRounding);
+    if (!extracts.empty() && extracts.back().box.meets(larger)) {
+      extracts.back().box.add(larger);
+    } else {
+      extracts.push_back({larger, {}});
+    }
+  }
+  const PlanarBox all = box_around(components.point);
+  const auto undone = [](const Extract& extract) { return !extract.done; };
+  join_boxes(extracts);
+  for (auto next = extracts.begin(); next != extracts.end();) {
+    if (Status status = extract_hanging(components, met, reach, all, *next); !status) return status;
+    if (!next->done) join_boxes(extracts);
+    next = std::ranges::find_if(extracts, undone);
+  }
+  for (const Extract& extract : extracts) out.append(extract.hanging);
   return {};
 }
 
@@ -111,13 +184,21 @@ Result<Contours> find_overhangs(const ContoursView& own, const ContoursView& bel
   } else {
     if (Status status = scratch.prepare(below, own, certain(reach) - 1); !status) return status.error();
     Buffer<std::uint32_t> rebased;
+    Contours candidates;
+    std::vector<PlanarBox> uncarried;
     for (std::uint32_t begin = 0, end = 0; begin < own.size(); begin = end) {
       end = end_of_component(own, begin);
       const ContoursView component = part_of(own, begin, end, rebased);
       const bool shares = shares_area(component, scratch);
-      if (shares && is_carried(component, scratch, certain(reach) - 1)) continue;
-      if (Status status = append_hanging(component, scratch, reach, shares, region); !status) return status.error();
+      const std::size_t before = uncarried.size();
+      find_uncarried(component, scratch, certain(reach) - 1, uncarried);
+      if (shares && uncarried.size() == before) continue;
+      const Result<bool> separate = shares ? Result<bool>(false) : is_separate(component, scratch);
+      if (!separate) return separate.error();
+      (*separate ? region : candidates).append(component);
+      if (*separate) uncarried.resize(before);
     }
+    if (Status status = append_hanging(candidates, scratch, reach, uncarried, region); !status) return status.error();
   }
   return region;
 }

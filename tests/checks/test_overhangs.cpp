@@ -1,13 +1,17 @@
 // Overhangs of rectangles, rings and polygons against hand-calculated areas.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "stages/checks/overhang_tally.h"
 #include "stages/checks/overhangs.h"
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/nest.h"
 
 namespace lamina::checks {
 namespace {
@@ -96,6 +100,72 @@ TEST(Overhangs, EdgesBetweenSteepFacesDoNotHang) {
   EXPECT_EQ(area_of(region_of({{-0.097, -0.097, 10.194, 10.194}}), region_of({{0, 0, 10, 10}}), 100'000), 0);
   EXPECT_NEAR(area_of(region_of({{-0.103, -0.103, 10.206, 10.206}}), region_of({{0, 0, 10, 10}}), 100'000),
               10.206 * 10.206 - 100, 1e-3);
+}
+
+/// Rectangles and circles, some of them holes, that move from layer to layer.
+struct RandomShapes {
+  std::mt19937 random;
+  std::vector<std::array<double, 4>> shapes;  // x, y, size, 0: solid square, 1: solid circle, 2: square hole, 3: round hole
+
+  double draw(double low, double high) { return std::uniform_real_distribution<>(low, high)(random); }
+  Contours region() const {
+    Contours solid, holes;
+    for (const auto& [x, y, size, kind] : shapes) {
+      Contours one = kind == 1 || kind == 3 ? circle_of(size * kMm / 2, 40) : region_of({{-size / 2, -size / 2, size, size}});
+      for (Point2& p : one.point) p = {p.x + static_cast<Nm>(x * kMm), p.y + static_cast<Nm>(y * kMm)};
+      (kind >= 2 ? holes : solid).append(one);
+    }
+    Contours region = *subtract_contours(*contour_union(solid, FillRule::kNonzero), *contour_union(holes, FillRule::kNonzero));
+    order_by_outer(region);
+    return region;
+  }
+};
+
+/// By the definition, with boolean operations of all contours.
+double defined_area(const Contours& own, const Contours& below, std::int64_t reach) {
+  const Contours carrying = *offset_contours(below, std::max<std::int64_t>(reach - 4, 4));
+  Contours candidates;
+  double area = 0;
+  for (std::uint32_t begin = 0, end = 0; begin < own.size(); begin = end) {
+    end = begin + 1;
+    while (end < own.size() && doubled_area(own[end]) < 0) ++end;
+    Contours component;
+    for (std::uint32_t c = begin; c < end; ++c) {
+      component.point.insert(component.point.end(), own[c].begin(), own[c].end());
+      component.close();
+    }
+    if (intersect_contours(component, below)->size() == 0) {
+      area += square_mm(doubled_area(component));
+    } else if (subtract_contours(component, carrying)->size() > 0) {
+      candidates.append(component);
+    }
+  }
+  const Contours far = *subtract_contours(candidates, carrying);
+  const Contours near = *intersect_contours(candidates, *offset_contours(far, reach + 8));
+  return area + square_mm(doubled_area(*subtract_contours(near, below)));
+}
+
+TEST(Overhangs, AreThoseOfTheDefinition) {
+  RandomShapes shapes{std::mt19937(7), {}};
+  int hanging = 0, carried = 0;
+  for (int round = 0; round < 400; ++round) {
+    shapes.shapes.clear();
+    const int count = 2 + round % 12;
+    for (int i = 0; i < count; ++i)
+      shapes.shapes.push_back({shapes.draw(0, 20), shapes.draw(0, 20), shapes.draw(0.5, 9), std::floor(shapes.draw(0, 4))});
+    const Contours below = shapes.region();
+    const double largest = shapes.draw(0, 0.4);
+    for (auto& [x, y, size, kind] : shapes.shapes) x += shapes.draw(-largest, largest), size += shapes.draw(-largest, largest);
+    const Contours own = shapes.region();
+    if (own.size() == 0 || below.size() == 0) continue;
+    for (const std::int64_t reach : {20'000, 200'000, 1'000'000}) {
+      const double expected = defined_area(own, below, reach);
+      EXPECT_NEAR(area_of(own, below, reach), expected, 1e-3) << round << " " << reach;
+      (expected > 0 ? hanging : carried) += 1;
+    }
+  }
+  EXPECT_GT(hanging, 300);
+  EXPECT_GT(carried, 200);
 }
 
 TEST(Overhangs, ReachIsThatOfTheAngle) {

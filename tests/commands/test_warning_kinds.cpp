@@ -45,6 +45,7 @@ const std::vector<WarningKind> kKinds = {
     {"rows-capped", "jet open.obj" + kBed},
     {"rows-open", "jet open.obj part.stl --no-repair" + kBed, Page::kHasItNot},
     {"chains-open", "extrude open.obj part.stl --no-repair" + kExtruded},
+    {"overhangs", "extrude neck.obj" + kExtruded, Page::kHasItNot},
     {"islands", "jet islands.obj" + kInspected},
     {"loose", "jet islands.obj" + kInspected},
     {"hollows", "jet hollow.obj" + kInspected},

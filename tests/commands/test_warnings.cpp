@@ -63,8 +63,10 @@ TEST_F(Warnings, OddJobsHaveACodeAndAPosition) {
   EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 100 --bleed 2000 -o b"), Codes{"bleed"});
   EXPECT_EQ(reported("slice part.stl --layer 0.5 --tolerance 900 -o c"), Codes{"tolerance"});
   EXPECT_EQ(reported("slice part.stl --layer 0.5 --pattern raster --bead 50 -o d"), Codes{"no-bead"});
-  EXPECT_EQ(reported("extrude part.stl --machine anet-a8 --layer 0.25 --bottom 5 -o e.gcode"), Codes{"above-bed"});
-  EXPECT_EQ(summary_["warnings"][0]["z_mm"], 5.0);
+  EXPECT_EQ(reported("extrude part.stl --machine anet-a8 --layer 0.25 --bottom 5 -o e.gcode"),
+            (Codes{"overhangs", "above-bed"}));
+  EXPECT_EQ(summary_["warnings"][0]["z_mm"], 5.125);
+  EXPECT_EQ(summary_["warnings"][1]["z_mm"], 5.0);
 }
 
 TEST_F(Warnings, APartAmongOthersThatIsLost) {

@@ -7,8 +7,10 @@
 #include "pipeline/cli/other_programs.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
+#include "pipeline/machine/profiles.h"   // is_named
 #include "pipeline/manifest/manifest.h"  // title_of
 #include "pipeline/plan/layers.h"
+#include "pipeline/plan/overhangs.h"
 #include "pipeline/report/heights_study.h"
 #include "stages/formats/rp3/rp3.h"
 #include "stages/support/io/file.h"
@@ -19,7 +21,7 @@ namespace {
 
 // Of [[part]] what changes its shape or height.
 constexpr std::string_view kHeightsCommandKeys =
-    "layers heights load part.unit part.bottom_mm part.scale part.rotate_deg part.shrink";
+    "layers heights load slice.support_angle_deg part.unit part.bottom_mm part.scale part.rotate_deg part.shrink";
 
 enum class Form { kText, kCsv, kJson, kRp3 };
 constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"json", Form::kJson}, {"rp3", Form::kRp3}};
@@ -98,8 +100,42 @@ std::string rp3_text(const Job& job, const heights::Study& study) {
   return formats::rp3::text_of(layers, settings);
 }
 
-std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<heights::Study>& studies) {
-  StudiedParts parts{{}, scene.height, text_of(job.heights, job.layer_mm), job.heights.cusp_mm};
+/// What hangs in the layers of each table, for tables that are sliced. Of separate tables, those after the first are of one
+/// part each.
+Result<std::vector<checks::OverhangTally>> overhangs_of(const Job& job, const Scene& scene,
+                                                        const std::vector<heights::Study>& studies, bool by_part) {
+  std::vector<checks::OverhangTally> tallies;
+  for (std::size_t table = 0; table < studies.size(); ++table) {
+    const heights::Study& study = studies[table];
+    const bool alone = by_part && table > 0 && table <= scene.parts.size();
+    std::vector<Instance> instances;
+    Box around;
+    for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+      if (alone && scene.part_of_instance[i] != table - 1) continue;
+      instances.push_back(scene.instances[i]);
+      around.add(box_of(scene, scene.instances[i]));
+    }
+    // Positions on the bed are arbitrary here: they are reported from the corner of the parts.
+    for (Instance& instance : instances) instance.offset.x -= around.lo.x, instance.offset.y -= around.lo.y;
+    std::vector<Layer> layers;
+    std::vector<Nm> planes;
+    for (std::size_t i = 0; i < study.layers(); ++i) {
+      const Layer layer{static_cast<std::uint32_t>(i), static_cast<Nm>(study.boundaries[i]),
+                        static_cast<Nm>(study.thickness(i))};
+      layers.push_back(layer);
+      planes.push_back(plane_of(job, layer, around.hi.z));
+    }
+    auto tally = tally_overhangs(scene.meshes, instances, job.fill_rule, layers, planes, job.support_angle_deg);
+    if (!tally) return tally.error();
+    tallies.push_back(std::move(*tally));
+  }
+  return tallies;
+}
+
+std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<heights::Study>& studies,
+                       const std::vector<checks::OverhangTally>& overhangs) {
+  StudiedParts parts{{},        scene.height,         text_of(job.heights, job.layer_mm), job.heights.cusp_mm,
+                     overhangs, job.support_angle_deg};
   for (const PartSummary& part : scene.parts) parts.paths.push_back(part.path);
   switch (form) {
     case Form::kJson: return json_line(with_schema(parse_json(study_json(parts, studies))));
@@ -107,7 +143,7 @@ std::string table_text(Form form, const Job& job, const Scene& scene, const std:
     case Form::kRp3: return rp3_text(job, studies.back());
     case Form::kText: break;
   }
-  return studies.size() > 1 ? comparison_page(studies) : study_page(parts, studies.back());
+  return studies.size() > 1 ? comparison_page(parts, studies) : study_page(parts, studies.back());
 }
 
 /// The options of the tables; given tables need no thickness.
@@ -168,8 +204,20 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   if (arguments.has("--save-job")) {
     if (Status status = save_job(arguments.text("--save-job"), read->requested, "heights"); !status) return status.error();
   }
+  const bool compares = arguments.has("--compare");
+  // Slicing the layers of every mode takes several times as long as deciding them.
+  const bool slices = !compares || is_named(*job, "slice.support_angle_deg");
+  const auto overhangs =
+      slices ? overhangs_of(*job, *scene, *studies, job->heights.per_part && !compares) : std::vector<checks::OverhangTally>();
+  if (!overhangs) return overhangs.error();
   const heights::Study& last = studies->back();
-  if (Status status = report(output, table_text(form, *job, *scene, *studies), context); !status) return status.error();
+  if (Status status = report(output, table_text(form, *job, *scene, *studies, *overhangs), context); !status)
+    return status.error();
+  std::vector<Warning> warnings;
+  for (const checks::OverhangTally& tally : *overhangs) tally.warn(job->support_angle_deg, warnings);
+  if (!compares && !arguments.has("--quiet")) {
+    for (const Warning& warning : warnings) context.say(fmt::format("warning   {}", warning.text));
+  }
   if (studies->size() == 1 && !arguments.has("--quiet")) {
     context.say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),
                             surface.count(), last.plan_seconds, last.evaluate_seconds));

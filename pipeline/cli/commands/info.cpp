@@ -6,8 +6,10 @@
 #include "pipeline/cli/keys.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/manifest/manifest.h"
+#include "pipeline/plan/overhangs.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/pores/pore_analysis.h"
+#include "pipeline/report/overhang_observer.h"
 #include "pipeline/report/part_info.h"
 #include "stages/formats/images/layer_images.h"
 #include "stages/formats/images/stack_info.h"
@@ -34,6 +36,7 @@ CommandSpec info_spec() {
                   {"--drop-bad", "", "drop facets with NaN or infinite coordinates", "", ""},
                   {"--repair", "MODE", "repair of open meshes: auto, winding (approximate) or off", "auto", "", modes},
                   {"--weld", "UM", "max gap to weld in micrometres; 5 is doubled as needed", "5", ""},
+                  {"--support-angle", "DEG", "report overhangs flatter than this; 0: wall, 89: flat", "", ""},
                   {"--threshold", "N", "images: pixels with a grey below N are set, 1 to 255", "128", ""},
                   {"--memory", "SIZE", "memory limit for images in flight: 256M, 1G", "1G", ""},
                   {"--density", "G/CM3", "filament density in g/cm3, if the toolpath file states none", "", ""},
@@ -84,6 +87,52 @@ Status report_images(const std::string& path, int threshold, std::uint64_t memor
   return failure(Fault::kInput, "{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images);
 }
 
+/// What hangs over air in a part as planned: sampled in layers of 0.2 mm, thicker ones if it has more than 500 of them.
+struct PartOverhangs {
+  checks::OverhangTally tally;
+  double layer_mm = 0;
+};
+
+Result<PartOverhangs> overhangs_of(const std::string& path, const load::LoadOptions& options, double angle_deg) {
+  const Result<Part> part = load::load(path, options);
+  if (!part) return part.error();
+  constexpr std::int64_t kThinnest = 200'000, kMaxLayers = 500, kStep = 1000;  // nm, layers, nm
+  const std::int64_t height = std::max<std::int64_t>(part->bounds.height(), 1);
+  const auto thickness = static_cast<Nm>(std::max(kThinnest, ceil_div(ceil_div(height, kMaxLayers), kStep) * kStep));
+  std::vector<Instance> instances = part->instances;
+  for (Instance& instance : instances) instance.offset.z -= part->bounds.lo.z;
+  std::vector<Layer> layers;
+  std::vector<Nm> planes;
+  for (std::uint32_t i = 0; std::int64_t{i} * thickness < height; ++i) {
+    layers.push_back({i, static_cast<Nm>(i * std::int64_t{thickness}), thickness});
+    planes.push_back(layers.back().plane_below(height));
+  }
+  auto tally = tally_overhangs(part->meshes, instances, FillRule::kNonzero, layers, planes, angle_deg);
+  if (!tally) return tally.error();
+  return PartOverhangs{std::move(*tally), mm(thickness)};
+}
+
+/// Adds the overhangs to the page of a part, if they are requested.
+Status add_overhangs(const std::string& path, const load::LoadOptions& options, const Arguments& arguments, double angle_deg,
+                     Context& context, std::string& page) {
+  if (!arguments.has("--support-angle")) return {};
+  const auto overhangs = overhangs_of(path, options, angle_deg);
+  if (!overhangs) return overhangs.error();
+  if (arguments.has("--json")) {
+    Json json = parse_json(page);
+    json["overhangs"] = overhangs_json(overhangs->tally, angle_deg);
+    json["overhangs"]["layer_mm"] = overhangs->layer_mm;
+    page = json_line(json);
+  } else {
+    page += fmt::format("\n  overhangs            {:.2f} mm2 flatter than {} degrees, in layers of {} mm\n",
+                        overhangs->tally.area_mm2(), number_text(angle_deg), number_text(overhangs->layer_mm));
+  }
+  std::vector<Warning> warnings;
+  overhangs->tally.warn(angle_deg, warnings);
+  for (const Warning& warning : warnings) context.say(fmt::format("warning   {}: {}", one_line(path), warning.text));
+  return {};
+}
+
 /// errors  kUsage: an option that is of none of the operands
 Status check_flags(const Arguments& arguments) {
   const auto any = [&](auto names) { return std::ranges::any_of(arguments.operands, names); };
@@ -94,7 +143,7 @@ Status check_flags(const Arguments& arguments) {
     return at_option("--threshold", "is of layer images; leave it out");
   if (arguments.has("--memory") && !any(formats::names_images))
     return at_option("--memory", "is of layer images; leave it out");
-  for (const char* flag : {"--unit", "--scale", "--rotate", "--drop-bad", "--repair", "--weld"})
+  for (const char* flag : {"--unit", "--scale", "--rotate", "--drop-bad", "--repair", "--weld", "--support-angle"})
     if (arguments.has(flag) && !parts) return at_option(flag, "is of parts, not of toolpaths or images");
   return {};
 }
@@ -111,6 +160,8 @@ Outcome run_info(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--threshold", {1, 255}, threshold); !status) return status;
   std::uint64_t memory = std::uint64_t{1} << 30;
   if (Status status = arguments.read("--memory", read_bytes, memory); !status) return status;
+  double angle_deg = 45;
+  if (Status status = arguments.read("--support-angle", {0, 89, " degrees"}, angle_deg); !status) return status;
   if (Status status = check_flags(arguments); !status) return status;
   int code = 0;
   const bool json = arguments.has("--json");
@@ -121,9 +172,11 @@ Outcome run_info(const Arguments& arguments, Context& context) {
     } else if (formats::names_images(part.path)) {
       status = report_images(part.path, static_cast<int>(threshold), memory, arguments, context);
     } else {
-      const auto page =
-          (json ? describe_part_json : describe_part_text)(part.path, load_options(*job, part), slice::surplus_areas);
+      auto page = (json ? describe_part_json : describe_part_text)(part.path, load_options(*job, part), slice::surplus_areas);
       if (page) {
+        if (status = add_overhangs(part.path, load_options(*job, part), arguments, angle_deg, context, *page); !status) {
+          code = std::max(code, context.complain(status.error()));
+        }
         if (status = json ? context.give(parse_json(*page)) : context.print(*page); !status) return status.error();
         continue;
       }

@@ -269,8 +269,8 @@ PlanCommand slice_row() {
 // --- lamina extrude
 
 constexpr std::string_view kExtrudeKeys =
-    "bed.margin_mm layers heights placement machine.profile fill image.fill segment extrude load slice.tolerance_um run.output "
-    "run.threads run.memory run.sync run.layers run.strict run.allow_empty part";
+    "bed.margin_mm layers heights placement machine.profile fill image.fill segment extrude load slice.tolerance_um "
+    "slice.support_angle_deg run.output run.threads run.memory run.sync run.layers run.strict run.allow_empty part";
 
 constexpr std::string_view kExtrudeBasic =
     "--output --machine --layer --walls --density --pattern --top-layers --bottom-layers --fill --bead --angle --print-speed --skirt "

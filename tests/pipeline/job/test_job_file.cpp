@@ -79,6 +79,7 @@ Job unusual_job(const Directory& directory) {
   job.inspect = true;
   job.min_wall_mm = 0.35;
   job.min_drain_mm = 1.25;
+  job.support_angle_deg = 52.5;
   job.allow_unbound = true;
   job.output = directory / "out";
   job.engine = Engine::kBoth;
