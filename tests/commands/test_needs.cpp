@@ -24,7 +24,7 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
       {"slice", "--bead-gap 1", "--pattern raster"},
       {"slice", "--angle 45", "--pattern raster"},
       {"slice", "--stagger 0,0.1", "--set fill.pattern=raster"},
-      {"extrude", "--angle 45", "--fill segmented --machine anet-a8 --layer 0.2"},
+      {"extrude", "--bead-gap 1", "--fill raster --machine anet-a8 --layer 0.2"},
       {"jet", "--first-layers 3", "--first-bleed 50"},
       {"jet", "--min-wall 1", "--inspect"},
       {"jet", "--gap 3", "--copies 2"},

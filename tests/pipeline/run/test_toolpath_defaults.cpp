@@ -170,7 +170,7 @@ double to_nearest_bead(const GcodeLayer& layer, const std::string& type, double 
 
 TEST(ToolpathDefaults, WallsKeepTheirDepthWithinTheToleranceReported) {
   const Directory directory;
-  const std::string job = kToothFile + " --layer 0.4 --walls 2 --skirt 0";
+  const std::string job = kToothFile + " --layer 0.4 --walls 2 --fill none --skirt 0";
   const Extruded less = extruded(directory, job), all = extruded(directory, job + " --tolerance 0");
   ASSERT_EQ(less.file.layers.size(), all.file.layers.size());
   const double maximum = less.summary["tolerance_um"].get<double>() / 1000 + 0.0015;  // files have three decimals
