@@ -332,9 +332,9 @@ const JobKey kSliceKeys[] = {
         slice_key("bridge_mm", "--bridge", "MM", "max gap in mm to close in open meshes (with --no-repair)"), {0, 1000, " mm"}),
     field<&Job::slice, &SliceRequest::offset_mm>(
         slice_key("offset_mm", "--offset", "MM", "contour offset in mm, positive outwards"), {-1000, 1000, " mm"}),
-    field<&Job::support_angle_deg>({"slice", "support_angle_deg", "--support-angle", "DEG",
-                                    "overhang warning: max angle in degrees; 0: wall, 90: horizontal"},
-                                   {0, 89, " degrees"}),
+    field<&Job::support_angle_deg>(
+        {"slice", "support_angle_deg", "--support-angle", "DEG", "overhangs: max angle in degrees; 0: wall, 90: horizontal"},
+        {0, 89, " degrees"}),
 };
 
 // --- [extrude]

@@ -36,7 +36,7 @@ CommandSpec info_spec() {
                   {"--drop-bad", "", "drop facets with NaN or infinite coordinates", "", ""},
                   {"--repair", "MODE", "repair of open meshes: auto, winding (approximate) or off", "auto", "", modes},
                   {"--weld", "UM", "max gap to weld in micrometres; 5 is doubled as needed", "5", ""},
-                  {"--support-angle", "DEG", "report overhangs flatter than this; 0: wall, 89: flat", "", ""},
+                  {"--support-angle", "DEG", "report overhangs above this angle in degrees (0: wall)", "", ""},
                   {"--threshold", "N", "images: pixels with a grey below N are set, 1 to 255", "128", ""},
                   {"--memory", "SIZE", "memory limit for images in flight: 256M, 1G", "1G", ""},
                   {"--density", "G/CM3", "filament density in g/cm3, if the toolpath file states none", "", ""},
