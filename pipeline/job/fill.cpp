@@ -272,7 +272,7 @@ std::string read_filling(std::string_view word, Job& job) {
     return fmt::format("'{}' is a rule for shells that overlap; give --fill-rule {} (image.fill in a file)", word, word);
   }
   if (!word.empty() && word.front() >= '0' && word.front() <= '9') {
-    return fmt::format("'{}' is no pattern; a density is --density {}", word, word);
+    return fmt::format("'{}' is no pattern; a density is --density {}", word, word.substr(0, word.find('%')));
   }
   const std::string wrong = fill_settings_keys().front().read(word, job.fill.all);
   if (wrong.empty()) job.segment.all.on = false;  // a pattern instead of the segmented lines of a file

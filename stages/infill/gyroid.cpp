@@ -30,12 +30,12 @@ GyroidSection::Across GyroidSection::across_at(double along) const {
   return {half - phase, std::numbers::pi - 2 * half};
 }
 
-GyroidSection::Range GyroidSection::steps(Point2 low, Point2 high) const {
+GyroidSection::NumberInterval GyroidSection::steps(Point2 low, Point2 high) const {
   const double step = period_ / kSteps;
   return {static_cast<std::int64_t>(std::floor(along(low) / step)), static_cast<std::int64_t>(std::ceil(along(high) / step))};
 }
 
-GyroidSection::Range GyroidSection::curves(Point2 low, Point2 high) const {
+GyroidSection::NumberInterval GyroidSection::curves(Point2 low, Point2 high) const {
   // Angles of the first position are between -5/4 and 3/4 of a turn, the second is at most a turn further.
   const double from = over_y_ ? low.x : low.y, to = over_y_ ? high.x : high.y;
   return {2 * (static_cast<std::int64_t>(std::floor(from / period_)) - 2),
@@ -43,12 +43,12 @@ GyroidSection::Range GyroidSection::curves(Point2 low, Point2 high) const {
 }
 
 std::uint64_t GyroidSection::count_points(Point2 low, Point2 high) const {
-  const Range step = steps(low, high), curve = curves(low, high);
+  const NumberInterval step = steps(low, high), curve = curves(low, high);
   return static_cast<std::uint64_t>((step.last - step.first + 1) * (curve.last - curve.first));
 }
 
 void GyroidSection::append_curves(Point2 low, Point2 high, Contours& out) const {
-  const Range step = steps(low, high), curve = curves(low, high);
+  const NumberInterval step = steps(low, high), curve = curves(low, high);
   const double margin = period_ / kSteps * 2;  // between two points a curve moves less across
   const double from = (over_y_ ? low.x : low.y) - margin, to = (over_y_ ? high.x : high.y) + margin;
   for (std::int64_t number = curve.first; number < curve.last; ++number) {

@@ -31,7 +31,7 @@ class GyroidSection {
   Nm along(Point2 p) const { return over_y_ ? p.y : p.x; }
 
  private:
-  struct Range {
+  struct NumberInterval {
     std::int64_t first, last;
   };
   /// The first of the two positions across, in radians, at a position along; the second is `width` further.
@@ -39,8 +39,8 @@ class GyroidSection {
     double first, width;
   };
   Across across_at(double along) const;
-  Range steps(Point2 low, Point2 high) const;
-  Range curves(Point2 low, Point2 high) const;
+  NumberInterval steps(Point2 low, Point2 high) const;
+  NumberInterval curves(Point2 low, Point2 high) const;
 
   bool over_y_;
   double sin_z_, cos_z_, period_;

@@ -349,7 +349,7 @@ TEST_F(OneMeaning, WordsThatAreWrongAreAnsweredByWhatIsRight) {
   } rows[] = {
       {"jet part.stl --machine nuferb --dry-run", 2, "did you mean 'nuferbj'?"},
       {"extrude part.stl --infill-pattern raster --dry-run", 2, "did you mean '--pattern'?"},
-      {"extrude part.stl --infill 20% --dry-run", 2, "20 % of 0.4 mm is --line-distance 2"},
+      {"extrude part.stl --infill 20% --dry-run", 2, "give one from 0 to 100 %"},
       {"jet part.stl --set part.3.copies=2 --dry-run", 2, "there is one part"},
       {"jet part.stl part.stl --set part.3.copies=2 --dry-run", 2, "there are 2 parts"},
       {"jet - --dry-run", 3, "parts are not read from standard input"},

@@ -273,7 +273,7 @@ constexpr std::string_view kExtrudeKeys =
     "slice.support_angle_deg run.output run.threads run.memory run.sync run.layers run.strict run.allow_empty part";
 
 constexpr std::string_view kExtrudeBasic =
-    "--output --machine --layer --walls --density --pattern --top-layers --bottom-layers --fill --bead --angle --print-speed --skirt "
+    "--output --machine --layer --walls --density --pattern --top-layers --bottom-layers --fill --bead --print-speed --skirt "
     "--copies --at --rotate --scale --unit --heights --job --resume";
 
 const OptionSpec kExtrudeSwitches[] = {

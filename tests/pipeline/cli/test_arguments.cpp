@@ -94,7 +94,7 @@ TEST(SlicerAliases, OfOtherSlicersAreAnsweredWithOurs) {
   } rows[] = {
       {"extrude", "--layer_height", "'--layer'"},
       {"extrude", "--wall_line_count", "'--walls'"},
-      {"extrude", "--fill-density", "--line-distance"},
+      {"extrude", "--fill-density", "'--density'"},
       {"extrude", "--infill-pattern", "'--pattern'"},
       {"jet", "--resolution", "'--dpi'"},
       {"slice", "--resolution", "'--tolerance'"},
@@ -114,11 +114,11 @@ TEST(SlicerAliases, OfOtherSlicersAreAnsweredWithOurs) {
 TEST(SlicerAliases, WithOurMeaningAreAcceptedUnderOurName) {
   const auto spec = pipeline::spec_of(*pipeline::find_command("extrude"));
   const auto read =
-      read_arguments(spec, {"part.stl", "--layer-height=0.2", "--perimeters", "3", "--infill", "raster", "--wall-loops", "2"});
+      read_arguments(spec, {"part.stl", "--layer-height=0.2", "--perimeters", "3", "--infill", "30", "--wall-loops", "2"});
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->text("--layer"), "0.2");
   EXPECT_EQ(read->all("--walls"), (std::vector<std::string>{"3", "2"}));
-  EXPECT_EQ(read->text("--fill"), "raster");
+  EXPECT_EQ(read->text("--density"), "30");
   const auto empty = read_arguments(spec, {"part.stl", "--layer-height", "--quiet"});
   ASSERT_FALSE(empty);
   EXPECT_EQ(empty.error().message.substr(0, 28), "--layer: needs a value, MM, ");

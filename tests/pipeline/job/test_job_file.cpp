@@ -35,6 +35,11 @@ Job unusual_job(const Directory& directory) {
   job.fill.all.gap_mm = {0.1, 0.25};
   job.fill.all.stagger_mm = {0, 0.2};
   job.fill.all.gap_by_height = {{0, 0.75}, {6, 0.1}};
+  job.fill.all.density_percent = 35;
+  job.fill.all.top_mm = 1;
+  job.fill.all.bottom_mm = 0;
+  job.fill.all.top_layers = 3;
+  job.fill.all.bottom_layers = 0;
   job.fill.ranges = {{1, 2.5, changes_of("{ gap_mm = 0, pattern = 'contour' }")}, {3, 4, {}}};
   job.segment.ranges = {{0, 1.5, {}}};
   job.extrude.material = directory / "own/resin.toml";

@@ -200,7 +200,7 @@ TEST(ToolpathDefaults, AJobFileIsGivenWhatItLeavesToThePrinter) {
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return outcome.err + outcome.out;
   };
-  const std::string walls = "job.toml names no fill.walls: the default is 1",
+  const std::string walls = "job.toml names no fill.walls: the default is 2",
                     layers = "names no layers.thickness_mm: layers are 0.2 mm";
   EXPECT_NE(said("").find(walls), std::string::npos);
   EXPECT_NE(said("").find(layers), std::string::npos);
