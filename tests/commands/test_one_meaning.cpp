@@ -212,7 +212,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
        "--facets: applies to --heights angle, cusp"},
       {"heights part.stl --heights optimal --thickness 0.5,1 --facets plane", "--facets: applies to --heights angle, cusp"},
       {"slice part.stl --dry-run --layer 1 --bridge 0.5", "--bridge: applies to open meshes"},
-      {"extrude part.stl --dry-run --walls 3 --print-speed 50", "--print-speed: applies to filling lines"},
+      {"extrude part.stl --dry-run --set fill.gap_mm=1 --print-speed 50", "--print-speed: applies to filling lines"},
       {"extrude part.stl --dry-run --machine anet-a8 --layer 0.3 --fill segmented --spacing-cc 0.5",
        "--spacing-cc: is between continuous lines"},
       {"extrude part.stl --dry-run --machine anet-a8 --fill segmented --pattern contour --segment-rule fukuda",
