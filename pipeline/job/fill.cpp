@@ -163,7 +163,20 @@ void apply(const FillChanges& changes, FillSettings& settings) {
       if (std::ranges::find(kDistanceKeys, key.name) != std::end(kDistanceKeys)) key.copy(plain, settings);
     }
   }
+  const bool takes_gaps =
+      names_key(changes, "pattern") && !needs_density(changes.values.pattern) && changes.values.pattern != Pattern::kRaster;
+  if (takes_gaps) settings.density_percent.reset();  // of the job
   apply<FillSettings>(kFillKeys, changes, settings);
+}
+
+bool names_key(const FillChanges& changes, std::string_view name) {
+  return std::ranges::any_of(changes.keys, [&](std::size_t key) { return kFillKeys[key].name == name; });
+}
+
+bool names_spacing(const FillChanges& changes) {
+  const auto keys = distance_keys(changes);
+  const bool gaps = std::ranges::any_of(keys, [](std::string_view key) { return key != "density_percent"; });
+  return gaps || names_key(changes, "pattern") || names_key(changes, "group");
 }
 
 void set_distances(const std::vector<double>& distance_mm, FillChanges& changes) {

@@ -233,6 +233,9 @@ bool fills(const FillSettings& settings);
 std::vector<std::string_view> distance_keys(const FillSettings& settings);
 /// The same for changes: every key that is set, to any value.
 std::vector<std::string_view> distance_keys(const FillChanges& changes);
+/// Whether changes set a key, and whether they set how lines are spaced other than by a density.
+bool names_key(const FillChanges& changes, std::string_view name);
+bool names_spacing(const FillChanges& changes);
 
 /// Sets the materials of the parts: "steel" for all, or "steel,bronze" one per part in order.
 /// errors  kUsage: wrong number of names, or an invalid name

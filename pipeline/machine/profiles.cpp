@@ -231,10 +231,11 @@ namespace {
 
 /// Whether the job says how lines are spaced, or that there are none.
 bool names_filling(const Job& job) {
-  constexpr std::string_view kKeys[] = {"fill.pattern",     "fill.gap_mm", "fill.distance_mm", "fill.gap_by_height",
-                                        "fill.gap_formula", "fill.range",  "segment.fill",     "fill.group"};
+  constexpr std::string_view kKeys[] = {"fill.pattern",     "fill.gap_mm",  "fill.distance_mm", "fill.gap_by_height",
+                                        "fill.gap_formula", "segment.fill", "fill.group"};
   return job.segment.any() || std::ranges::any_of(kKeys, [&](std::string_view key) { return is_named(job, key); }) ||
-         std::ranges::any_of(job.parts, [](const PartRequest& part) { return !part.fill.empty(); });
+         std::ranges::any_of(job.parts, [](const PartRequest& part) { return names_spacing(part.fill); }) ||
+         std::ranges::any_of(job.fill.ranges, [](const FillRange& range) { return names_spacing(range.changes); });
 }
 
 }  // namespace

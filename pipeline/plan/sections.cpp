@@ -141,6 +141,7 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   if (job.heights.per_part) {
     if (Status status = made.make_own_slicers(job, body); !status) return status.error();
   }
+  made.reach_ = made.skin_reach();
   made.keep_neighbours(0);
   if (tolerance > 0) {
     for (const slice::Slicer& own : made.own_slicers_) made.exact_slicers_.push_back(own.exact());
@@ -312,10 +313,10 @@ Status Sections::slice_layer(std::uint32_t index, slice::SectionScratch& scratch
 }
 
 void Sections::keep_neighbours(std::uint32_t layers) {
-  const std::uint32_t reach = skin_reach();
-  if (reach == 0) return;
+  if (reach_ == 0) return;
   neighbours_->used = true;
-  neighbours_->contours.reserve(layers + 2 * reach + 2);
+  constexpr std::uint32_t kMaxReach = 64;  // further layers are cut again: memory stays bounded
+  neighbours_->contours.reserve(layers + 2 * std::min(reach_, kMaxReach) + 2);
 }
 
 void Sections::keep_exact_neighbours(std::uint32_t layers) {
@@ -464,7 +465,7 @@ Status Sections::keep_covered(std::uint32_t index, const Area& area, Contours& r
       }
       const auto other = shared_contours(*at);
       if (!other) return other.error();
-      auto both = intersect_contours(region, (*other)->contours.of(area.body, rebased));
+      auto both = intersect_contours(region, (*other)->contours.of(area.body, rebased), false);
       if (!both) return both.error();
       region = std::move(*both);
     }
@@ -515,7 +516,9 @@ std::uint64_t Sections::bytes_bound(std::uint32_t index) const {
   if (part_slicer_) contours += bound(*part_slicer_);
   std::uint64_t walls = 0;
   for (const Area& area : areas_) walls = std::max<std::uint64_t>(walls, filling(area, scheduled.own()).walls);
-  return (fills_ ? 2 : 1) * contours + walls * contours / 16 + (1 << 14);  // walls hold few of a contour's bytes
+  // A skin takes operations of the regions in addition.
+  return ((fills_ ? 2 : 1) + (reach_ > 0 ? 2 : 0)) * contours + walls * contours / 16 +
+         (1 << 14);  // walls hold few of a contour's bytes
 }
 
 Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const {

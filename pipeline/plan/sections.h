@@ -178,9 +178,10 @@ class Sections {
   ContoursView contours_of(const Area& area, Work& work) const;
   Error failed(const Area& area, const Error& error) const;
   Box bounds_;
-  Nm grow_ = 0;       // of an offset outwards
-  Nm tolerance_ = 0;  // of layers made of two planes
-  Nm of_walls_ = 0;   // of what is made of filled contours
+  Nm grow_ = 0;              // of an offset outwards
+  Nm tolerance_ = 0;         // of layers made of two planes
+  Nm of_walls_ = 0;          // of what is made of filled contours
+  std::uint32_t reach_ = 0;  // layers in the thickest skin
   bool fills_ = false;
 };
 

@@ -299,17 +299,17 @@ std::uint32_t skin_layers(const FillParameters& parameters, Nm thickness) {
 Status divide_skins(const ContoursView& covered, const FillParameters& parameters, Outlines& outlines) {
   const Contours& all = outlines.region;
   if (doubled_area(covered) == doubled_area(all)) return {};
-  auto near = subtract_contours(all, covered);
+  auto near = subtract_contours(all, covered, false);
   if (near) near = offset_contours(*near, -kNoise);
   if (!near) return near.error();
   if (near->size() == 0) return {};
   auto sparse = offset_contours(*near, kNoise + parameters.width);
-  if (sparse) sparse = subtract_contours(all, *sparse);
+  if (sparse) sparse = subtract_contours(all, *sparse, false);
   // What is too narrow for sparse lines is solid as well.
   if (sparse) sparse = offset_contours(*sparse, -std::int64_t{parameters.width});
   if (sparse) sparse = offset_contours(*sparse, parameters.width);
   if (!sparse) return sparse.error();
-  auto solid = subtract_contours(all, *sparse);
+  auto solid = subtract_contours(all, *sparse, false);
   if (!solid) return solid.error();
   outlines.solid = std::move(*solid);
   outlines.region = std::move(*sparse);

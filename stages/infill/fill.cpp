@@ -103,6 +103,9 @@ Status check_density(const FillParameters& parameters) {
     return Error{Fault::kUsage, fmt::format("a density of {} %; it has to be 0 to 100", *parameters.density * 100)};
   }
   if (needs_density(parameters.pattern) || parameters.pattern == Pattern::kRaster) return {};
+  if (parameters.pattern == Pattern::kNone) {
+    return Error{Fault::kUsage, "a density needs a pattern; add lines, grid, gyroid or raster"};
+  }
   return Error{Fault::kUsage, "a density spaces lines, grid, gyroid and raster; other patterns take gaps"};
 }
 

@@ -120,7 +120,7 @@ class JobsReported : public ::testing::Test {
 
 TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
   const Outcome made =
-      lamina({"extrude", corpus_file("parameter_quality_nut.stl"), "--layer", "0.3", "--quiet", "-o", "part.gcode"});
+      lamina({"extrude", corpus_file("parameter_quality_nut.stl"), "--layer", "0.3", "--walls", "1", "--fill", "none", "--quiet", "-o", "part.gcode"});
   ASSERT_EQ(made.code, 0) << made.err;
   ASSERT_EQ(lamina({"report", "part.gcode", "-o", "part.html"}).code, 0);
   const std::string page = read_text(directory_ / "part.html");

@@ -136,7 +136,7 @@ TEST_F(Resume, AnOlderJobOutlivesOneThatIsRefused) {
   for (const char* machine : {"anet-a8 --layer 0.3 -o a.gcode", "fdm-2000 --layer 0.254 -o a.sml"}) {
     const std::string where = std::string(" --quiet --overwrite --machine ") + machine;
     done("extrude tall.stl --walls 1" + where);
-    refused("extrude part.stl --walls 0" + where, 3, "not one bead");
+    refused("extrude part.stl --walls 0 --fill none" + where, 3, "not one bead");
     refused("extrude part.stl --walls 1 --bottom 5 --strict" + where, 5, "[above-bed]");
   }
 }

@@ -173,7 +173,7 @@ class Module(unittest.TestCase):
         self.assertEqual(summary["command"], "slice")
         name = pathlib.Path(CROWN).stem + ".svg"
         self.assertEqual((self.directory / "cut" / name).read_bytes(), (self.directory / "own" / name).read_bytes())
-        settings = {"layers.thickness_mm": 0.2, "fill.walls": 1, "machine.profile": "marlin"}
+        settings = {"layers.thickness_mm": 0.2, "fill.walls": 2, "machine.profile": "marlin"}
         one, two = self.directory / "one.gcode", self.directory / "two.gcode"
         done = run("extrude", CROWN, "--machine", "marlin", "--quiet", "-o", one)
         self.assertEqual(done.returncode, 0, done.stderr)

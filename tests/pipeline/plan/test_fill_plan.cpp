@@ -1,4 +1,5 @@
 // tests/pipeline/plan/test_fill_plan.cpp: the filling at each height of each part.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <string_view>
@@ -57,6 +58,20 @@ TEST(FillPlan, TheOneDirectionToGiveDistancesReplacesTheOneThatHeld) {
   ASSERT_TRUE(own.ok()) << own.error().message;
   EXPECT_TRUE(own->at(500'000).distances.empty());
   EXPECT_EQ(own->at(500'000).gap_expression, "0.1");
+}
+
+TEST(FillPlan, APatternThatTakesGapsEndsTheDensityOfTheJob) {
+  FillRequest request;
+  request.all.pattern = infill::Pattern::kGrid;
+  request.all.density_percent = 30;
+  for (const char* pattern : {"none", "contour", "honeycomb"}) {
+    const auto plan = plan_filling(request, changes_of(fmt::format("{{ pattern = '{}' }}", pattern)));
+    ASSERT_TRUE(plan.ok()) << pattern;
+    EXPECT_FALSE(plan->base.density) << pattern;
+  }
+  const auto raster = plan_filling(request, changes_of("{ pattern = 'raster' }"));
+  ASSERT_TRUE(raster.ok());
+  EXPECT_EQ(raster->base.density, 0.3);
 }
 
 }  // namespace

@@ -151,7 +151,7 @@ TEST(PoresOfJobs, AWrongJobIsALine) {
   write_text(folder / "unknown.toml", unknown + part);
   write_text(folder / "key.toml", unknown + "thick = 1\n");
   write_text(folder / "no_part.toml", unknown);
-  write_text(folder / "walls.toml", "[machine]\nprofile = \"anet-a8\"\n" + part);
+  write_text(folder / "walls.toml", "[machine]\nprofile = \"anet-a8\"\n[fill]\npattern = \"none\"\n" + part);
   write_text(folder / "solid.toml", "[bed]\ndpi = 300\n" + unknown + part);
   const struct {
     const char* line;

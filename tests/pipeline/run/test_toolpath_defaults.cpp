@@ -223,6 +223,26 @@ TEST(ToolpathDefaults, OfALibrariesJobAreThePrintersOnlyIfItLeavesThem) {
   EXPECT_EQ(resolved->job.fill.all.walls, 0u);
 }
 
+TEST(ToolpathDefaults, APartOrARangeThatNamesNoSpacingKeepsTheGrid) {
+  const auto density = [](const std::vector<std::string>& keys) {
+    pipeline::Job job;
+    job.machine.profile = "marlin";
+    job.leave_to_machine = job.dry_run = true;
+    job.parts.emplace_back().path = kToothFile;
+    for (const std::string& key : keys) EXPECT_TRUE(pipeline::set_key(job, key).ok()) << key;
+    const auto resolved = pipeline::resolve(job, Product::kMoves);
+    EXPECT_TRUE(resolved.ok());
+    return resolved ? resolved->job.fill.all.density_percent : std::nullopt;
+  };
+  EXPECT_EQ(density({}), 20);
+  EXPECT_EQ(density({"part.1.fill={ width_mm = 0.6 }"}), 20);
+  EXPECT_EQ(density({"part.1.fill={ density_percent = 50 }"}), 20);
+  EXPECT_EQ(density({"fill.range=[{ from_mm = 2, to_mm = 4, density_percent = 50 }]"}), 20);
+  EXPECT_EQ(density({"part.1.fill={ gap_mm = 1 }"}), std::nullopt);
+  EXPECT_EQ(density({"fill.range=[{ from_mm = 2, to_mm = 4, pattern = 'raster' }]"}), std::nullopt);
+  EXPECT_EQ(density({"fill.gap_mm=1"}), std::nullopt);
+}
+
 TEST(ToolpathDefaults, SkirtComesFirstAndIsDistinguished) {
   for (const std::string machine : {"anet-a8", "marlin"}) {  // absolute and relative extrusion
     SCOPED_TRACE(machine);
