@@ -129,7 +129,7 @@ bool EdgeBands::carries(Point2 a, Point2 b, double reach, bool or_inside, int di
                       end = offset_[static_cast<std::size_t>(band_of(a.y + by)) + 1];
   const double reach2 = reach * reach;
   for (std::uint32_t i = begin; i < end; ++i) {
-    const auto& [from, to] = edge_[i];
+    const Point2 from = edge_[i].a, to = edge_[i].b;
     const auto away = [&](Point2 p) {
       return p.x < std::min(from.x, to.x) - by || p.x > std::max(from.x, to.x) + by || p.y < std::min(from.y, to.y) - by ||
              p.y > std::max(from.y, to.y) + by;
