@@ -113,6 +113,11 @@ bool varies_filling(const Job& job) {
 bool deposits_lines(Product, const Job& job) {
   return job.fill.all.pattern != infill::Pattern::kNone || job.segment.any() || varies_filling(job);
 }
+/// Skins are of a density below 100 %.
+bool has_skins(Product product, const Job& job) {
+  const auto& density = job.fill.all.density_percent;
+  return (density && *density < 100) || (product == Product::kMoves && varies_filling(job));
+}
 /// Only curves that are not closed, and lines, are cut by a rule.
 bool cuts_lines(Product, const Job& job) { return job.fill.all.pattern != infill::Pattern::kContour || varies_filling(job); }
 bool lies_in_pairs(Product, const Job& job) { return job.segment.all.continuous > 1 || !job.segment.ranges.empty(); }
@@ -159,6 +164,7 @@ constexpr std::string_view kUniform =
                                "applies to steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
                            kBeads = "applies to beads, but there are none; add --fill, --pattern or --walls",
                            kLines = "applies to lines, but there is no pattern; add --fill or --pattern",
+                           kSparse = "applies to a filling by density, and there is none below 100 %; add --density",
                            kTurned = "applies to lines with a direction, but there are none; add --fill raster";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
@@ -180,6 +186,8 @@ constexpr Need kNeeds[] = {
     {"--bead-gap", deposits_lines, kLines},
     {"--line-distance", deposits_lines, kLines},
     {"--gap-formula", deposits_lines, kLines},
+    {"--top-layers", has_skins, kSparse},
+    {"--bottom-layers", has_skins, kSparse},
     {"--angle", turns_lines, kTurned},
     {"--angle-step", turns_lines, kTurned},
     {"--stagger", deposits_lines, kLines},

@@ -56,7 +56,7 @@ void replace_profile(TomlValue& value, std::string_view key, const fs::path& fol
   std::error_code ignored;
   if (names_stream(file) || !is_profile_path(value.text) || fs::exists(value.text, ignored)) return;
   const bool here = fs::path(said).is_relative() && fs::exists(said, ignored);
-  job.missing.emplace_back(value.text, fmt::format("{}{}: {}: no such machine profile; correct it (relative paths start at "
+  job.missing.emplace_back(value.text, fmt::format("{}{}: {}: no such profile; correct it (relative paths start at "
                                                    "the job file{})",
                                                    value.position.text(file), key, one_line(value.text),
                                                    here ? ", not where lamina runs, where " + one_line(said) + " is" : ""));

@@ -106,6 +106,9 @@ constexpr Key<FillSettings> kFillKeys[] = {
 
 constexpr std::string_view kDistanceKeys[] = {"distance_mm", "gap_formula", "gap_by_height", "gap_mm", "density_percent"};
 
+/// Without effect on lines that follow from a density (check() in stages/infill/fill.h refuses them).
+constexpr std::string_view kOfGaps[] = {"group", "stagger_mm", "first_line_mm", "end_inset_mm", "link_mm"};
+
 /// Two mutually exclusive keys of one table.
 std::string check_distances(const FillChanges& changes) {
   const auto keys = distance_keys(changes);
@@ -157,12 +160,14 @@ std::string fill_changes_text(const FillChanges& changes) {
 }
 
 void apply(const FillChanges& changes, FillSettings& settings) {
-  if (!distance_keys(changes).empty()) {
+  const auto reset = [&](std::span<const std::string_view> names) {
     const FillSettings plain;
     for (const auto& key : kFillKeys) {
-      if (std::ranges::find(kDistanceKeys, key.name) != std::end(kDistanceKeys)) key.copy(plain, settings);
+      if (std::ranges::find(names, key.name) != names.end()) key.copy(plain, settings);
     }
-  }
+  };
+  if (!distance_keys(changes).empty()) reset(kDistanceKeys);
+  if (names_key(changes, "density_percent")) reset(kOfGaps);
   const bool takes_gaps =
       names_key(changes, "pattern") && !needs_density(changes.values.pattern) && changes.values.pattern != Pattern::kRaster;
   if (takes_gaps) settings.density_percent.reset();  // of the job

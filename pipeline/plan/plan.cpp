@@ -328,18 +328,24 @@ class Planner {
 
   /// Lines at gap 0 touch, but their round sides leave a void.
   void warn_of_touching_lines() {
-    const FillSettings& fill = job().fill.all;
-    const bool touch = fill.pattern == infill::Pattern::kRaster || fill.pattern == infill::Pattern::kContour ||
-                       fill.pattern == infill::Pattern::kContourRaster;
-    if (!touch || plan_.segments->any() || !distance_keys(fill).empty() || !job().fill.ranges.empty()) return;
+    if (plan_.segments->any()) return;
     const double height = mm(plan_.sections->layers().front().layer.thickness);
-    const double area = bead_area(fill.width_mm, height, plan_.moves->profile.machine.material.shape());
-    const double share = 1 - area / (fill.width_mm * height);
-    if (share <= 0.05) return;
+    double largest = 0.05;
+    const auto consider = [&](const infill::FillParameters& fill) {
+      const auto distance = infill::touching_distance(fill);
+      if (!distance) return;
+      const double area = bead_area(mm(fill.width), height, plan_.moves->profile.machine.material.shape());
+      largest = std::max(largest, 1 - area / (*distance * 1e-6 * height));
+    };
+    for (const FillPlan& plan : plan_.sections->fillings()) {
+      consider(plan.base);
+      for (const FillPlan::FillInterval& range : plan.ranges) consider(range.parameters);
+    }
+    if (largest <= 0.05) return;
     plan_.warnings.push_back(
         {"voids", fmt::format("lines at gap 0 touch and leave {:.1f} % of their volume void, because their "
                               "sides are round; --density 100 has none",
-                              100 * share)});
+                              100 * largest)});
   }
 
   const ProgressCallback& progress_;

@@ -117,6 +117,7 @@ class Sections {
 
   const std::vector<ScheduledLayer>& layers() const { return schedule_.layers; }
   const slice::Slicer& slicer() const { return *slicer_; }
+  const std::vector<FillPlan>& fillings() const { return plans_; }  // by part of the job
   const std::vector<std::string>& names() const { return names_; }  // of bodies
   const std::vector<std::uint32_t>& body_of_instance() const { return body_; }
   const Box& bounds() const { return bounds_; }  // around all, as sliced

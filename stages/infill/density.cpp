@@ -296,6 +296,21 @@ std::uint32_t skin_layers(const FillParameters& parameters, Nm thickness) {
   return std::max(layers(parameters.top_layers, parameters.top), layers(parameters.bottom_layers, parameters.bottom));
 }
 
+namespace {
+
+/// What is too narrow for sparse lines next to faces is left out: it becomes solid. Further away it stays.
+/// near  what is near faces, kNoise inside its edge
+Result<Contours> without_narrow(const Contours& sparse, const Contours& near, Nm width) {
+  auto wide = offset_contours(sparse, -std::int64_t{width});
+  if (wide) wide = offset_contours(*wide, width);
+  auto narrow = wide ? subtract_contours(sparse, *wide, false) : std::move(wide);
+  if (narrow) narrow = intersect_contours(*narrow, *offset_contours(near, kNoise + 3 * std::int64_t{width}), false);
+  if (!narrow) return narrow.error();
+  return subtract_contours(sparse, *narrow, false);
+}
+
+}  // namespace
+
 Status divide_skins(const ContoursView& covered, const FillParameters& parameters, Outlines& outlines) {
   const Contours& all = outlines.region;
   if (doubled_area(covered) == doubled_area(all)) return {};
@@ -305,9 +320,7 @@ Status divide_skins(const ContoursView& covered, const FillParameters& parameter
   if (near->size() == 0) return {};
   auto sparse = offset_contours(*near, kNoise + parameters.width);
   if (sparse) sparse = subtract_contours(all, *sparse, false);
-  // What is too narrow for sparse lines is solid as well.
-  if (sparse) sparse = offset_contours(*sparse, -std::int64_t{parameters.width});
-  if (sparse) sparse = offset_contours(*sparse, parameters.width);
+  if (sparse) sparse = without_narrow(*sparse, *near, parameters.width);
   if (!sparse) return sparse.error();
   auto solid = subtract_contours(all, *sparse, false);
   if (!solid) return solid.error();

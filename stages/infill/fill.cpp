@@ -102,6 +102,12 @@ Status check_density(const FillParameters& parameters) {
   if (!(*parameters.density >= 0 && *parameters.density <= 1)) {
     return Error{Fault::kUsage, fmt::format("a density of {} %; it has to be 0 to 100", *parameters.density * 100)};
   }
+  if (parameters.group > 1 || parameters.stagger != std::vector<Nm>{0} || parameters.first_line || parameters.end_inset ||
+      parameters.longest_link >= 0) {
+    return Error{
+        Fault::kUsage,
+        "a density decides where lines are; leave out groups, staggers, first lines, end insets and links, or the density"};
+  }
   if (needs_density(parameters.pattern) || parameters.pattern == Pattern::kRaster) return {};
   if (parameters.pattern == Pattern::kNone) {
     return Error{Fault::kUsage, "a density needs a pattern; add lines, grid, gyroid or raster"};

@@ -66,6 +66,22 @@ Nm layer_stagger(const FillParameters& parameters, std::uint32_t layer) {
   return parameters.stagger.empty() ? 0 : parameters.stagger[turn % parameters.stagger.size()];
 }
 
+std::optional<double> touching_distance(const FillParameters& fill) {
+  const bool parallel =
+      fill.pattern == Pattern::kRaster || fill.pattern == Pattern::kContour || fill.pattern == Pattern::kContourRaster;
+  if (!parallel || fill.density || !fill.gap_table.empty() || !fill.gap_expression.empty()) return std::nullopt;
+  const std::vector<Nm>& list = fill.distances.empty() ? fill.gaps : fill.distances;
+  const Nm more = fill.distances.empty() ? fill.width : 0;
+  if (list.empty() || std::ranges::max(list) + more > fill.width) return std::nullopt;
+  double sum = 0;
+  for (const Nm each : list) sum += each + more;
+  if (fill.distances.empty() && fill.group > 1) {  // beads within a group are one width from each other
+    sum += static_cast<double>(list.size() * (fill.group - 1)) * fill.width;
+    return sum / static_cast<double>(list.size() * fill.group);
+  }
+  return sum / static_cast<double>(list.size());
+}
+
 double mean_distance_mm(const FillParameters& fill) {
   if (fill.pattern == Pattern::kHoneycomb || fill.pattern == Pattern::kQuatrefoil) return mm(fill.cell) / 2;
   double sum = 0;

@@ -70,6 +70,10 @@ FillParameters parameters_of(const FillSettings& settings);
 /// The mean distance of lines, mm; for estimates: tables and expressions of gaps do not count.
 double mean_distance_mm(const FillParameters& fill);
 
+/// The mean distance of lines or closed curves that all touch their neighbours, nm; nothing if some may have gaps, or if a
+/// density spaces them.
+std::optional<double> touching_distance(const FillParameters& fill);
+
 /// Where a layer stands in its part.
 struct FillContext {
   Layer layer;

@@ -74,7 +74,7 @@ TEST_F(MaterialCommands, WhatIsNoMaterialOrTooHotIsRefused) {
           "--material: no material 'plastic'; name a profile (a file that ends in .toml) or one of abs, asa, petg, pla, tpu");
   refused("extrude part.stl --material petgg --dry-run", "did you mean 'petg'?");
   refused("extrude part.stl --material marlin --dry-run", "no material 'marlin'");
-  refused("extrude part.stl --material ./none.toml --dry-run", "none.toml: no such machine profile");
+  refused("extrude part.stl --material ./none.toml --dry-run", "none.toml: no such profile");
   write_text(directory_ / "speed.toml", "[speed]\nprint_mm_s = 3\n");
   refused("extrude part.stl --material ./speed.toml --dry-run", "speed.toml: [speed] is no section of a material");
   write_text(directory_ / "own.toml", "inherits = \"abs\"\n[material]\nname = \"Own\"\nnozzle_degc = 281\n");
@@ -84,6 +84,8 @@ TEST_F(MaterialCommands, WhatIsNoMaterialOrTooHotIsRefused) {
           "Own: nozzle of 281 degrees: Cool reaches 260 (machine.max_nozzle_degc)");
   refused("extrude part.stl --machine ./cool.toml --material abs --dry-run", "ABS: bed of 110 degrees: Cool reaches 100");
   done("extrude part.stl --machine ./cool.toml --material abs --bed-temperature 100 --dry-run");
+  refused("extrude part.stl --machine marlin --material abs --nozzle-temperature 261 --dry-run",
+          "ABS: nozzle of 261 degrees: Marlin reaches 260 (machine.max_nozzle_degc)");
   write_text(directory_ / "self.toml", "inherits = \"self.toml\"\n");
   refused("extrude part.stl --material ./self.toml --dry-run", "self.toml:1:12: inherits: goes round in a circle");
 }

@@ -120,7 +120,7 @@ TEST_F(NamedFiles, OfPrintersOfFilamentDoSoToo) {
 }
 
 TEST_F(NamedFiles, ThatAreNotThereAreReportedWithWhereTheyWereSearched) {
-  const std::string corrected = "no such machine profile; correct it (relative paths start at the job file";
+  const std::string corrected = "no such profile; correct it (relative paths start at the job file";
   fs::rename(folder_ / "jobs/mine.toml", folder_ / "mine.toml");
   expect_refused(
       "jet --job jobs/job.toml --dry-run", 2,

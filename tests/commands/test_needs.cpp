@@ -31,6 +31,8 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
       {"slice", "--angle 30 --pattern contour", "--pattern raster"},
       {"slice", "--angle-step 30 --pattern contour", "--pattern raster"},
       {"slice", "--stagger 0,0.1", "--pattern contour"},
+      {"slice", "--top-layers 3", "--pattern grid --density 20"},
+      {"extrude", "--bottom-layers 3 --fill raster", "--density 20 --layer 0.2"},
       {"slice", "--file-a-layer --format null", "--format svg"},
       {"jet", "--allow-unbound", "--machine hp45 --preset binding.toml"},
       {"jet", "--allow-unbound --machine hp45", "--preset binding.toml"},

@@ -143,6 +143,52 @@ TEST(Density, SkinsLeaveNothingBetweenSparseAndSolid) {
   EXPECT_GT(solid, 40);
 }
 
+// A fin of 0.7 mm, too narrow for sparse lines: solid where a skin reaches it, sparse further away.
+TEST(Density, NarrowRegionsAreSolidNextToFacesAlone) {
+  const Contours comb = contours_of({{{0, 0}, {20, 0}, {20, 20}, {19.3, 20}, {19.3, 5}, {0.7, 5}, {0.7, 20}, {0, 20}}});
+  const FillParameters parameters = by_density(Pattern::kGrid, 0.2, 0);
+  auto made = infill::outlines_of(comb, context_of(comb), parameters);
+  ASSERT_TRUE(made.ok());
+  const Contours covered = contours_of({{{0, 0}, {20, 0}, {20, 10}, {19.3, 10}, {19.3, 5}, {0.7, 5}, {0.7, 20}, {0, 20}}});
+  ASSERT_TRUE(infill::divide_skins(covered, parameters, *made).ok());
+  // The right fin above 10 mm, and what is narrow within three widths of that.
+  EXPECT_NEAR(square_mm(doubled_area(made->solid)), 0.7 * (10 + 3 * 0.4), 0.02);
+  EXPECT_NEAR(square_mm(doubled_area(made->region)) + square_mm(doubled_area(made->solid)), 100 + 2 * 0.7 * 15, 1e-3);
+}
+
+TEST(Density, SettingsOfGapsAreRefused) {
+  const auto refused = [](auto change) {
+    FillParameters parameters = by_density(Pattern::kRaster, 0.5);
+    EXPECT_TRUE(infill::check(parameters).ok());
+    change(parameters);
+    return !infill::check(parameters).ok();
+  };
+  EXPECT_TRUE(refused([](FillParameters& p) { p.group = 2; }));
+  EXPECT_TRUE(refused([](FillParameters& p) { p.stagger = {0, 100'000}; }));
+  EXPECT_TRUE(refused([](FillParameters& p) { p.first_line = 100'000; }));
+  EXPECT_TRUE(refused([](FillParameters& p) { p.end_inset = 0; }));
+  EXPECT_TRUE(refused([](FillParameters& p) { p.longest_link = 0; }));
+}
+
+TEST(TouchingDistance, IsTheMeanOfLinesWithoutGaps) {
+  FillParameters fill;
+  EXPECT_EQ(infill::touching_distance(fill), 400'000);
+  fill.distances = {400'000, 360'000};
+  EXPECT_EQ(infill::touching_distance(fill), 380'000);
+  fill.distances = {400'001};
+  EXPECT_FALSE(infill::touching_distance(fill));
+  fill.distances.clear();
+  fill.gaps = {-40'000, 0};
+  EXPECT_EQ(infill::touching_distance(fill), 380'000);
+  fill.group = 2;
+  EXPECT_EQ(infill::touching_distance(fill), 390'000);
+  fill.gaps = {100'000};
+  EXPECT_FALSE(infill::touching_distance(fill));
+  fill.gaps = {0};
+  fill.density = 1;
+  EXPECT_FALSE(infill::touching_distance(fill));
+}
+
 TEST(Density, UnlinkedPatternsNeedOne) {
   for (const Pattern pattern : {Pattern::kLines, Pattern::kGrid, Pattern::kGyroid}) {
     FillParameters parameters;

@@ -214,7 +214,9 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   if (Status status = report(output, table_text(form, *job, *scene, *studies, *overhangs), context); !status)
     return status.error();
   std::vector<Warning> warnings;
-  for (const checks::OverhangTally& tally : *overhangs) tally.warn(job->support_angle_deg, warnings);
+  // The first of separate tables is the one that the parts would share.
+  for (std::size_t table = job->heights.per_part && overhangs->size() > 1 ? 1 : 0; table < overhangs->size(); ++table)
+    (*overhangs)[table].warn(job->support_angle_deg, warnings);
   if (!compares && !arguments.has("--quiet")) {
     for (const Warning& warning : warnings) context.say(fmt::format("warning   {}", warning.text));
   }

@@ -244,11 +244,12 @@ std::string extruder_text(const ExtruderProfile& profile) {
   });
 }
 
-std::string material_text(const ExtruderProfile& profile) {
+std::string material_text(const ExtruderProfile& profile, const std::vector<std::string>& keys) {
   constexpr Text kOfMachine[] = {"nozzle_mm", "bead_area", "flow", "feed_ratio", "lag_s"};
-  return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string& value) {
-    if (key.section == "fan") return true;
-    return key.section == "material" && std::ranges::find(kOfMachine, key.name) == std::end(kOfMachine) && key.unsaid != value;
+  return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string&) {
+    if (std::ranges::find(keys, fmt::format("{}.{}", key.section, key.name)) == keys.end()) return false;
+    return key.section == "fan" ||
+           (key.section == "material" && std::ranges::find(kOfMachine, key.name) == std::end(kOfMachine));
   });
 }
 

@@ -24,8 +24,8 @@ std::string set_extruder_key(std::string_view name, std::string_view value, Extr
 
 /// The text with every key of a profile; reading it restores the profile.
 std::string extruder_text(const ExtruderProfile& profile);
-/// Only the keys of its material: of [material] without nozzle, flow and lag, and of [fan].
-std::string material_text(const ExtruderProfile& profile);
+/// Only the keys of its material, of those in `keys` as section.key: of [material] without nozzle, flow and lag, and of [fan].
+std::string material_text(const ExtruderProfile& profile, const std::vector<std::string>& keys);
 
 // --- changed values for some keys of a profile.
 

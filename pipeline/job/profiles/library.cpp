@@ -130,7 +130,7 @@ bool Library::is_own(std::string_view name) const {
 }
 
 Result<Library::Found> Library::find(const std::string& name, const std::string& folder) const {
-  ReadRules rules{.fault = Fault::kUsage, .missing = "no such machine profile", .max_bytes = kMaxTomlBytes};
+  ReadRules rules{.fault = Fault::kUsage, .missing = "no such profile", .max_bytes = kMaxTomlBytes};
   std::string path = name;
   if (!is_profile_path(name)) {
     const auto shipped = std::ranges::find(shipped_, name, &ShippedProfile::name);

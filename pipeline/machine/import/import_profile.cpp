@@ -42,6 +42,9 @@ constexpr ImportedKey kMaterialKeys[] = {
     {"material.bed_degc", {"bed_temperature", "hot_plate_temp"}},
     {"material.first_bed_degc", {"first_layer_bed_temperature", "hot_plate_temp_initial_layer"}},
     {"fan.from_layer", {"disable_fan_first_layers", "close_fan_the_first_x_layers"}}};
+/// Of all layers, and of the first.
+constexpr std::pair<const char*, const char*> kTemperatures[] = {{"material.nozzle_degc", "material.first_nozzle_degc"},
+                                                                 {"material.bed_degc", "material.first_bed_degc"}};
 constexpr ImportedKey kPrinterKeys[] = {
     {"bed.build_height_mm", {"max_print_height", "printable_height"}},
     {"material.nozzle_mm", {"nozzle_diameter"}},
@@ -90,7 +93,7 @@ class ProfileImporter {
     if (!request_.choice.printer.empty()) source += ", " + request_.choice.printer;
     if (!is_utf8(source)) source = "a file";  // TOML is UTF-8
     imported.text = fmt::format("{} from {}\n\n{}", kImportMark, one_line(source),
-                                printer ? extruder_text(profile_) : material_text(profile_));
+                                printer ? extruder_text(profile_) : material_text(profile_, set_));
     imported.notes = std::move(config_.notes);
     imported.unused = settings_.unused();
     return imported;
@@ -104,7 +107,9 @@ class ProfileImporter {
   /// Sets a key of the profile. from  the setting, for messages
   Status set(std::string_view key, const std::string& value, std::string_view from) {
     const std::string what = set_extruder_key(key, value, profile_);
-    return what.empty() ? Status() : wrong(from, value, what);
+    if (!what.empty()) return wrong(from, value, what);
+    set_.emplace_back(key);
+    return {};
   }
 
   /// The number of a setting; a percentage of `whole`. Nothing if it is absent, or 0 and that means absent.
@@ -215,8 +220,28 @@ class ProfileImporter {
 
   Status set_material() {
     if (Status status = set_all(kMaterialKeys); !status) return status;
-    profile_.machine.material.name = one_line(settings_.element("filament_type").value_or(""));
+    for (const auto& [one, other] : kTemperatures) {
+      if (Status status = copy_temperature(one, other); !status) return status;
+      if (Status status = copy_temperature(other, one); !status) return status;
+    }
+    if (const auto name = settings_.element("filament_type"); name && !one_line(*name).empty()) {
+      profile_.machine.material.name = one_line(*name);
+      set_.emplace_back("material.name");
+    }
     return set_fan();
+  }
+
+  bool is_set(std::string_view key) const { return std::ranges::find(set_, key) != set_.end(); }
+
+  /// A temperature of the first or of the other layers that the file lacks is that of the others or of the first.
+  Status copy_temperature(const char* from, const char* to) {
+    if (!is_set(from) || is_set(to)) return {};
+    const auto& m = profile_.machine.material;
+    const bool nozzle = std::string_view(to).find("nozzle") != std::string_view::npos;
+    const bool of_first = std::string_view(from).find("first") != std::string_view::npos;
+    const double degc = nozzle ? (of_first ? m.first_nozzle_degc : m.nozzle_degc) : (of_first ? m.first_bed_degc : m.bed_degc);
+    config_.notes.push_back(fmt::format("{} is not in the file; it is {}, {:g}", to, from, degc));
+    return set(to, number_text(degc), from);
   }
 
   /// The speed of layers that take long: the fan is faster in short layers, which lamina's is not.
@@ -234,6 +259,7 @@ class ProfileImporter {
   const std::string& path_;
   const ImportRequest& request_;
   ExtruderProfile profile_;
+  std::vector<std::string> set_;  // keys of the profile
 };
 
 }  // namespace

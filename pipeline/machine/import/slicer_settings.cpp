@@ -7,6 +7,30 @@
 
 namespace lamina::pipeline {
 
+namespace {
+
+/// The elements of a list: numbers are separated by commas, texts by semicolons and quoted where they contain one
+/// (PrusaSlicer, Config.cpp, unescape_strings_cstyle).
+std::vector<std::string_view> elements_of(std::string_view list) {
+  std::vector<std::string_view> elements;
+  std::size_t begin = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (list[i] == '\\' && quoted) {
+      ++i;
+    } else if (list[i] == '"') {
+      quoted = !quoted;
+    } else if (!quoted && (list[i] == ',' || list[i] == ';')) {
+      elements.push_back(list.substr(begin, i - begin));
+      begin = i + 1;
+    }
+  }
+  elements.push_back(list.substr(begin));
+  return elements;
+}
+
+}  // namespace
+
 void SlicerSettings::update(const SlicerSettings& other) {
   for (const auto& [key, setting] : other.setting_) setting_.insert_or_assign(key, setting);
 }
@@ -21,9 +45,12 @@ std::optional<std::string> SlicerSettings::text(std::string_view key) {
 }
 
 std::optional<std::string> SlicerSettings::element(std::string_view key, std::size_t index) {
-  const auto whole = text(key);
-  if (!whole) return std::nullopt;
-  const auto elements = split(*whole, ",");
+  const auto found = setting_.find(key);
+  if (found == setting_.end() || found->second.values.empty()) return std::nullopt;
+  found->second.used = true;
+  const std::vector<std::string>& values = found->second.values;
+  const auto elements =
+      values.size() > 1 ? std::vector<std::string_view>(values.begin(), values.end()) : elements_of(values[0]);
   const std::string_view chosen = unquoted(trimmed(elements[index < elements.size() ? index : 0]));
   if (chosen == "nil" || chosen.empty()) return std::nullopt;
   return std::string(chosen);

@@ -183,6 +183,18 @@ TEST(ImportedProfiles, OfAFilamentAreAMaterial) {
   EXPECT_EQ(profile->machine.material.price_kg, 25);
 }
 
+// Of a printer with other filament, a material changes only what its file states.
+TEST(ImportedProfiles, OfAFilamentStateWhatTheirFileStates) {
+  const auto imported = import_profile("temperature = 240\nfilament_type = \"PET, glycol\";PLA\n", "f.ini", {});
+  ASSERT_TRUE(imported.ok()) << imported.error().message;
+  EXPECT_NE(imported->text.find("name = \"PET, glycol\""), std::string::npos) << imported->text;
+  EXPECT_NE(imported->text.find("first_nozzle_degc = 240"), std::string::npos) << imported->text;
+  EXPECT_EQ(imported->notes,
+            std::vector<std::string>{"material.first_nozzle_degc is not in the file; it is material.nozzle_degc, 240"});
+  for (const char* absent : {"filament_mm", "density", "bed_degc", "price", "[fan]"})
+    EXPECT_EQ(imported->text.find(absent), std::string::npos) << absent << imported->text;
+}
+
 TEST(ImportedProfiles, OfOrcaFollowTheirBasesAndDefaults) {
   const std::string folder = std::string(LAMINA_TEST_DIR) + "/corpus/orca/";
   const auto of = [&](const std::string& file) { return import_profile(folder + file, {}); };
