@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stages/data/layer.h"
+#include "stages/data/lost_features.h"
 #include "stages/data/toolpaths.h"
 #include "stages/formats/extrusion_format.h"
 #include "stages/support/hash/hash.h"
@@ -55,6 +56,7 @@ struct PathFacts {
   DepositedSums deposited;
   /// By segmented range of heights, in a job whose layers can hold several; else empty, and not summed.
   std::vector<RangePores> by_range;
+  LostFeatures lost;                                       // of layers that this run made; in no manifest, and not summed
   std::shared_ptr<const LayerOverhang> overhang;  // null of layers that an earlier run made; in no manifest, and not summed
 
   /// Sums the fields. Summed in layer order, the result is deterministic.

@@ -418,7 +418,23 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
     work.outlines[a] = std::move(*outlines);
     if (Status status = divide_skins(index, area, work.outlines[a]); !status) return failed(area, status.error());
   }
+  find_lost(work);
   return {};
+}
+
+void Sections::find_lost(Work& work) const {
+  work.lost = {};
+  for (std::uint32_t a = 0; a < areas_.size(); ++a) {
+    const std::uint32_t original = work.original[a];
+    const Contours& lost = work.outlines[original].lost;
+    if (lost.size() == 0) continue;
+    if (work.lost.area_mm2 == 0) {
+      const Box &from = areas_[original].box, &to = areas_[a].box;
+      const Point2 first = lost.point[0];
+      work.lost.at = {static_cast<Nm>(first.x + to.lo.x - from.lo.x), static_cast<Nm>(first.y + to.lo.y - from.lo.y)};
+    }
+    work.lost.area_mm2 += square_mm(doubled_area(lost));
+  }
 }
 
 Status Sections::fill(std::uint32_t index, Work& work) const {
@@ -478,7 +494,7 @@ Status Sections::divide_skins(std::uint32_t index, const Area& area, infill::Out
   if (!infill::has_skins(parameters) || outlines.region.size() == 0) return {};
   Contours covered = outlines.region;
   if (Status status = keep_covered(index, area, covered); !status) return status;
-  return infill::divide_skins(covered, parameters, outlines);
+  return infill::divide_skins(covered, {schedule_.layers[index].own(), area.box, of_walls_}, parameters, outlines);
 }
 
 std::uint32_t Sections::skin_reach() const {

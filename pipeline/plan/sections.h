@@ -13,6 +13,7 @@
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/layer.h"
+#include "stages/data/lost_features.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
 #include "stages/infill/fill.h"
@@ -60,7 +61,8 @@ class Sections {
     slice::LayerContours parts;              // of areas in bodies with several parts, merged part by part
     std::vector<Contours> surface;           // of these areas: the region without earlier parts
     std::vector<infill::Outlines> outlines;  // of each area: where the centres of beads lie; none of copies of another
-    Buffer<std::uint32_t> original;          // of each area: the first one with the same contours, moved
+    LostFeatures lost;
+    Buffer<std::uint32_t> original;  // of each area: the first one with the same contours, moved
     Toolpaths paths;
     Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
     Buffer<std::uint32_t> path_area;  // the same of areas
@@ -168,6 +170,7 @@ class Sections {
   Result<std::shared_ptr<const SharedContours>> share(std::uint32_t index, slice::SectionScratch& scratch,
                                                       bool exact = false) const;
   std::uint32_t skin_reach() const;
+  void find_lost(Work& work) const;
   Status keep_covered(std::uint32_t index, const Area& area, Contours& region) const;
   Status divide_skins(std::uint32_t index, const Area& area, infill::Outlines& outlines) const;
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);

@@ -9,6 +9,7 @@
 #include "pipeline/plan/layers.h"
 #include "pipeline/report/overhang_observer.h"
 #include "stages/checks/layer_warnings.h"
+#include "stages/checks/lost_features_tally.h"
 #include "stages/formats/gcode/write_gcode.h"
 #include "stages/geometry/bead_section.h"
 #include "stages/support/text/number_text.h"
@@ -235,8 +236,10 @@ class FillingObserver : public ContourObserver {
   void layer(const LayerRecord& record, const slice::SectionReport*) override {
     contours_ += record.paths->contours;
     paths_ += record.paths->paths;
+    lost_.add(record.layer, record.paths->lost);
   }
   void warn(const Summary&, std::vector<Warning>& warnings) override {
+    lost_.warn(warnings);
     if (!plan_.sections->fills() || contours_ == 0 || paths_ > 0) return;
     warnings.push_back({"no-bead",
                         "no bead of the filling fits into the parts: they are narrower than walls and filling "
@@ -246,6 +249,7 @@ class FillingObserver : public ContourObserver {
  private:
   const Plan& plan_;
   std::uint64_t contours_ = 0, paths_ = 0;
+  checks::LostFeaturesTally lost_;
 };
 
 using MoveObserver = Observer<void>;
@@ -257,9 +261,11 @@ class BeadObserver : public MoveObserver {
   void layer(const LayerRecord& record, const void*) override {
     const DepositedSums& deposited = record.paths->deposited;
     paths_.add(record.layer, record.paths->open, deposited.segments.lines, deposited.segments.thin);
+    lost_.add(record.layer, record.paths->lost);
   }
   void warn(const Summary& summary, std::vector<Warning>& warnings) override {
     paths_.report(plan_.sections->fills(), sums_.totals.part_moves(), summary.layers_planned, warnings);
+    lost_.warn(warnings);
   }
   void report(Summary& summary) const override {
     const formats::MoveTotals& totals = sums_.totals;
@@ -282,6 +288,7 @@ class BeadObserver : public MoveObserver {
   const Plan& plan_;
   const PathFacts& sums_;
   checks::PathWarnings paths_;
+  checks::LostFeaturesTally lost_;
 };
 
 /// Segmented lines and the pores between them, by range of heights.

@@ -124,6 +124,7 @@ PathFacts facts_of(const Sections::Work& work) {
   facts.merged = work.report.merged;
   facts.open = work.report.gaps.open;
   facts.stored_points = work.paths.point.size();
+  facts.lost = work.lost;
   return facts;
 }
 

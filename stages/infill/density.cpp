@@ -10,9 +10,11 @@
 #include "stages/geometry/bead_section.h"
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/simplify.h"
+#include "stages/infill/gaps.h"
 #include "stages/infill/gyroid.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/lines.h"
+#include "stages/infill/solid.h"
 
 namespace lamina::infill {
 namespace {
@@ -96,52 +98,6 @@ std::uint64_t crossings_of_set(const ContoursView& region, const LineSet& set, c
   const Frame frame = frame_of(context, turned(parameters, set));
   const Contours in_frame = frame.to(region);
   return count_crossings(in_frame, positions_from_middle(in_frame, set.distance));
-}
-
-/// Solid lines of one connected region of bead centres, in their frame: so many of one width that they fill it from side to
-/// side. Their number is the next one to a pitch, so wide regions have beads of the set width, and narrow ones up to half more.
-struct SolidLines {
-  LinePositions positions;
-  double pitch;  // nm
-};
-SolidLines solid_lines(const ContoursView& inset, double pitch) {
-  const auto [low, high] = std::ranges::minmax_element(inset.point, {}, &Point2::y);
-  const std::int64_t from = low->y, to = std::int64_t{high->y} - 1;  // a line at the highest point crosses nothing
-  const double strip = static_cast<double>(to - from) + pitch;
-  const auto count = std::max<std::int64_t>(1, std::llround(strip / pitch));
-  SolidLines lines{{}, strip / static_cast<double>(count)};
-  lines.positions.at.reserve(static_cast<std::size_t>(count));
-  for (std::int64_t i = 0; i < count; ++i) {
-    const double at = static_cast<double>(from) - pitch / 2 + (static_cast<double>(i) + 0.5) * lines.pitch;
-    lines.positions.at.push_back(std::clamp<std::int64_t>(std::llround(at), from, std::max(from, to)));
-  }
-  return lines;
-}
-
-/// Calls use(region) for each outer contour with the holes in it. region  clean contours
-template <class Use>
-void for_each_component(const ContoursView& region, Use use) {
-  Buffer<std::uint32_t> offset;
-  for (std::uint32_t first = 0, end = 0; first < region.size(); first = end) {
-    end = first + 1;
-    while (end < region.size() && doubled_area(region[end]) < 0) ++end;
-    offset.clear();
-    for (std::uint32_t c = first; c <= end; ++c) offset.push_back(region.offset[c] - region.offset[first]);
-    use(ContoursView{offset, region.point.subspan(region.offset[first], offset.back())});
-  }
-}
-
-void append_solid(const ContoursView& inset, double pitch, const FillContext& context, const FillParameters& parameters,
-                  Toolpaths& out) {
-  const Frame frame = frame_of(context, parameters);
-  const double height = mm(context.layer.thickness);
-  const std::size_t before = out.point.size();
-  for_each_component(frame.to(inset), [&](const ContoursView& component) {
-    const SolidLines lines = solid_lines(component, pitch);
-    const auto width = static_cast<Nm>(nm_of(bead_width(lines.pitch * 1e-6 * height, height, parameters.shape)));
-    append_raster(component, turned(parameters, {lines.pitch, width}), lines.positions, frame, out);
-  });
-  std::fill(out.kind.begin() + static_cast<std::ptrdiff_t>(before), out.kind.end(), PathKind::kSolid);
 }
 
 /// The sparse lines of a layer, and whether they begin half a pitch inside of the region.
@@ -247,34 +203,87 @@ Status append_gyroid(const ContoursView& region, const SparseLines& lines, const
 
 }  // namespace
 
+namespace {
+
+/// Adds lines in narrow regions.
+void bound_gaps(std::uint64_t points, FillBound& bound) {
+  constexpr std::uint64_t kOfSample = 100;  // bytes in a grid and in lines
+  bound.points += points;
+  bound.paths += points / 2;
+  bound.intervals += points;
+  bound.scratch_bytes = std::max(bound.scratch_bytes, kOfSample * points);
+}
+
+}  // namespace
+
 double solid_pitch(const FillParameters& parameters, Nm width, Nm thickness) {
   return bead_area(mm(width), mm(thickness), parameters.shape) / mm(thickness) * 1e6;
 }
+
+namespace {
+
+GapWidths gap_widths(const FillParameters& parameters, Nm width, Nm thickness) {
+  const double pitch = solid_pitch(parameters, width, thickness);
+  return {static_cast<Nm>(pitch), min_gap(pitch)};
+}
+
+/// Where the centres of solid lines are.
+Status inset_solid(const FillContext& context, const FillParameters& parameters, Outlines& outlines) {
+  auto centres = offset_contours(outlines.solid, -half(solid_pitch(parameters, parameters.width, context.layer.thickness)));
+  if (!centres) return centres.error();
+  outlines.solid_centres = std::move(*centres);
+  return {};
+}
+
+/// Lines where the part is thinner than a wall, and what is too thin for them. wall  the first one
+Status add_thin_walls(const ContoursView& contours, const Contours& wall, Nm width, Nm minimum, Outlines& outlines) {
+  auto thin = narrow_part(contours, wall, width / 2);
+  if (!thin) return thin.error();
+  if (thin->size() == 0 && contours.size() <= wall.size()) return {};
+  auto lines = gap_lines(std::move(*thin), {width, minimum});
+  if (!lines) return lines.error();
+  outlines.thin_walls = std::move(*lines);
+  const Contours bare = bare_islands(contours, width, {&wall, &outlines.thin_walls.lines});
+  outlines.lost = add_dots(bare, minimum, outlines.thin_walls);
+  outlines.lost.append(narrow_features(outlines.thin_walls.left, minimum));
+  return {};
+}
+
+}  // namespace
 
 Result<Outlines> outlines_by_density(const ContoursView& contours, const FillContext& context,
                                      const FillParameters& parameters) {
   Outlines made;
   MergeScratch scratch;
-  Contours innermost;
-  ContoursView from = contours;
-  std::int64_t at = 0;
   const double pitch = solid_pitch(parameters, parameters.wall_width, context.layer.thickness);
+  Contours inside;
   for (std::uint32_t wall = 0; wall < parameters.walls; ++wall) {
-    const std::int64_t centre = parameters.wall_width / 2 + std::llround(wall * pitch);
-    auto moved = offset_contours(from, at - centre);
-    if (!moved) return moved.error();
-    innermost = std::move(*moved);
-    from = innermost;
-    at = centre;
-    if (innermost.size() == 0) break;
-    made.walls.push_back(innermost);
+    const ContoursView around = wall == 0 ? contours : ContoursView(inside);
+    const std::int64_t inwards = wall == 0 ? parameters.wall_width / 2 : half(pitch);
+    auto centres = offset_contours(around, -inwards);
+    if (!centres) return centres.error();
+    if (wall == 0) {
+      if (Status status = add_thin_walls(around, *centres, parameters.wall_width, min_gap(pitch), made); !status)
+        return status.error();
+    } else {
+      const auto narrow = narrow_part(around, *centres, inwards);
+      if (!narrow) return narrow.error();
+      made.gaps.append(*narrow);
+    }
+    auto next = offset_contours(*centres, -half(pitch));
+    if (!next) return next.error();
+    inside = std::move(*next);
+    if (centres->size() == 0) break;
+    made.walls.push_back(std::move(*centres));
     merge_short_edges(made.walls.back(), kShortestEdge, context.tolerance, scratch);
   }
-  auto inside = offset_contours(from, parameters.walls > 0 ? -half(pitch) : 0);
-  if (!inside) return inside.error();
   Contours& all = *parameters.density >= 1 ? made.solid : made.region;
-  all = std::move(*inside);
+  if (parameters.walls == 0) inside.append(contours);
+  all = std::move(inside);
   merge_short_edges(all, kShortestEdge, context.tolerance, scratch);
+  if (*parameters.density >= 1) {
+    if (Status status = inset_solid(context, parameters, made); !status) return status.error();
+  }
   return made;
 }
 
@@ -311,7 +320,8 @@ Result<Contours> without_narrow(const Contours& sparse, const Contours& near, Nm
 
 }  // namespace
 
-Status divide_skins(const ContoursView& covered, const FillParameters& parameters, Outlines& outlines) {
+Status divide_skins(const ContoursView& covered, const FillContext& context, const FillParameters& parameters,
+                    Outlines& outlines) {
   const Contours& all = outlines.region;
   if (doubled_area(covered) == doubled_area(all)) return {};
   auto near = subtract_contours(all, covered, false);
@@ -326,17 +336,19 @@ Status divide_skins(const ContoursView& covered, const FillParameters& parameter
   if (!solid) return solid.error();
   outlines.solid = std::move(*solid);
   outlines.region = std::move(*sparse);
-  return {};
+  return inset_solid(context, parameters, outlines);
 }
 
 Status append_by_density(const Outlines& outlines, const FillContext& context, const FillParameters& parameters,
                          Toolpaths& out) {
-  const double pitch = solid_pitch(parameters, parameters.width, context.layer.thickness);
-  if (outlines.solid.size() > 0) {
-    const auto inset = offset_contours(outlines.solid, -half(pitch));
-    if (!inset) return inset.error();
-    append_solid(*inset, pitch, context, parameters, out);
+  const Nm thickness = context.layer.thickness;
+  append_gap_lines(outlines.thin_walls, mm(thickness), parameters.shape, PathKind::kOuter, out);
+  if (outlines.gaps.size() > 0) {
+    const auto lines = gap_lines(outlines.gaps, gap_widths(parameters, parameters.wall_width, thickness));
+    if (!lines) return lines.error();
+    append_gap_lines(*lines, mm(thickness), parameters.shape, PathKind::kSolid, out);
   }
+  if (Status status = append_solid(outlines, context, parameters, out); !status) return status;
   if (outlines.region.size() == 0 || *parameters.density <= 0) return {};
   const SparseLines lines = sparse_lines(parameters, context.layer.thickness);
   if (parameters.pattern == Pattern::kGyroid) return append_gyroid(outlines.region, lines, context, parameters, out);
@@ -360,15 +372,13 @@ FillBound bound_by_density(const Outlines& outlines, const FillContext& context,
     bound.intervals += crossings;
     bound.scratch_bytes = std::max(bound.scratch_bytes, 30 * crossings + (24 + kOfClipper) * points);
   };
-  const double pitch = solid_pitch(parameters, parameters.width, context.layer.thickness);
+  const Nm thickness = context.layer.thickness;
+  bound_gaps(outlines.thin_walls.lines.point.size(), bound);
+  bound_gaps(bound_gap_points(outlines.gaps, gap_widths(parameters, parameters.wall_width, thickness)), bound);
   if (outlines.solid.size() > 0) {
-    std::uint64_t crossings = 0, points = 0;
-    for_each_component(frame_of(context, parameters).to(outlines.solid), [&](const ContoursView& component) {
-      crossings += count_crossings(component, solid_lines(component, pitch).positions);
-      points += component.point.size();
-    });
-    // The region of bead centres may divide: each of its parts then has a line more.
-    add(crossings + 4 * points, points);
+    const SolidBound solid = bound_solid(outlines, context, parameters);
+    add(solid.crossings, outlines.solid_centres.point.size());
+    bound_gaps(solid.gap_points, bound);
   }
   if (outlines.region.size() == 0 || *parameters.density <= 0) return bound;
   const SparseLines lines = sparse_lines(parameters, context.layer.thickness);

@@ -28,8 +28,8 @@ namespace lamina::infill {
 /// The distance of beads of a width, nm, that fill a layer completely.
 double solid_pitch(const FillParameters& parameters, Nm width, Nm thickness);
 
-/// Walls and all that is inside of them (`solid` at a density of 1, else `region`), of a filling by density.
-/// errors  kInternal of Clipper
+/// Walls, gaps between them, and all that is inside of them (`solid` at a density of 1, else `region`), of a filling by
+/// density. errors  kInternal of Clipper
 Result<Outlines> outlines_by_density(const ContoursView& contours, const FillContext& context,
                                      const FillParameters& parameters);
 
@@ -43,9 +43,10 @@ std::uint32_t skin_layers(const FillParameters& parameters, Nm thickness);
 /// Moves what is not covered from `region` to `solid`, with a margin of a bead, on which its lines rest.
 /// covered  the region without what is near faces
 /// errors   kInternal of Clipper
-Status divide_skins(const ContoursView& covered, const FillParameters& parameters, Outlines& outlines);
+Status divide_skins(const ContoursView& covered, const FillContext& context, const FillParameters& parameters,
+                    Outlines& outlines);
 
-/// Appends what outlines_by_density() left inside the walls: solid lines, then sparse ones. errors  kInternal of Clipper
+/// Appends thin walls and gaps, then what is inside the walls: solid lines, then sparse ones. errors  kInternal of Clipper
 Status append_by_density(const Outlines& outlines, const FillContext& context, const FillParameters& parameters,
                          Toolpaths& out);
 

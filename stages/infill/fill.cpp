@@ -172,6 +172,14 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
     const std::int64_t centre = (2 * std::int64_t{wall} + 1) * parameters.wall_width / 2;
     auto moved = offset_contours(from, at - centre);
     if (!moved) return moved.error();
+    if (wall == 0) {
+      const auto thin = narrow_part(contours, *moved, parameters.wall_width / 2);
+      if (!thin) return thin.error();
+      if (thin->size() > 0) {
+        made.lost = bare_islands(contours, parameters.wall_width, {&*moved});
+        made.lost.append(narrow_features(*thin, parameters.wall_width));
+      }
+    }
     if (moved->size() == 0) break;  // and so are all further in
     innermost = std::move(*moved);
     from = innermost;

@@ -12,6 +12,7 @@
 #include "stages/data/contours.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
+#include "stages/infill/gaps.h"
 #include "stages/infill/parameters.h"
 
 namespace lamina::infill {
@@ -25,11 +26,15 @@ struct Outlines {
   std::vector<Contours> walls;  // from the surface inwards; one that would hold nothing ends them
   Contours region;              // of filling beads: the contours moved inwards past the walls; nothing for kNone
   // --- by density: all inside the walls is `region`, whose sparse lines end at its edge, or `solid`
-  Contours solid;
+  Contours solid, solid_centres;  // the latter: of its lines
+  GapLines thin_walls;            // where the part is thinner than a bead
+  Contours gaps;                  // between walls, narrower than a bead
+  // --- of any filling
+  Contours lost;  // features of the part without a bead, since they are thinner than any
 
   std::uint64_t bytes() const {
     const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
-    std::uint64_t sum = of(region) + of(solid);
+    std::uint64_t sum = of(region) + of(solid) + of(solid_centres) + thin_walls.bytes() + of(gaps) + of(lost);
     for (const Contours& wall : walls) sum += of(wall);
     return sum;
   }

@@ -132,7 +132,7 @@ TEST(Density, SkinsLeaveNothingBetweenSparseAndSolid) {
   auto made = infill::outlines_of(square, context_of(square), parameters);
   ASSERT_TRUE(made.ok());
   const Contours covered = contours_of({{{0, 0}, {8, 0}, {8, 20}, {0, 20}}});
-  ASSERT_TRUE(infill::divide_skins(covered, parameters, *made).ok());
+  ASSERT_TRUE(infill::divide_skins(covered, context_of(square), parameters, *made).ok());
   // The solid side reaches a bead's width further.
   EXPECT_NEAR(square_mm(doubled_area(made->region)), 20 * 7.6, 0.01);
   EXPECT_NEAR(square_mm(doubled_area(made->solid)), 20 * 12.4, 0.01);
@@ -150,7 +150,7 @@ TEST(Density, NarrowRegionsAreSolidNextToFacesAlone) {
   auto made = infill::outlines_of(comb, context_of(comb), parameters);
   ASSERT_TRUE(made.ok());
   const Contours covered = contours_of({{{0, 0}, {20, 0}, {20, 10}, {19.3, 10}, {19.3, 5}, {0.7, 5}, {0.7, 20}, {0, 20}}});
-  ASSERT_TRUE(infill::divide_skins(covered, parameters, *made).ok());
+  ASSERT_TRUE(infill::divide_skins(covered, context_of(comb), parameters, *made).ok());
   // The right fin above 10 mm, and what is narrow within three widths of that.
   EXPECT_NEAR(square_mm(doubled_area(made->solid)), 0.7 * (10 + 3 * 0.4), 0.02);
   EXPECT_NEAR(square_mm(doubled_area(made->region)) + square_mm(doubled_area(made->solid)), 100 + 2 * 0.7 * 15, 1e-3);
