@@ -7,6 +7,7 @@ namespace lamina::pipeline {
 namespace {
 
 using infill::Pattern;
+using infill::Seam;
 
 constexpr Word<Pattern> kPatterns[] = {{"none", Pattern::kNone},           {"raster", Pattern::kRaster},
                                        {"contour", Pattern::kContour},     {"contour+raster", Pattern::kContourRaster},
@@ -47,6 +48,9 @@ std::string gaps_by_height_text(const std::vector<std::array<double, 2>>& gaps) 
   return text.empty() ? text : fmt::format("[{}]", text);
 }
 
+constexpr Word<Seam> kSeams[] = {
+    {"contour", Seam::kContour}, {"aligned", Seam::kAligned}, {"rear", Seam::kRear}, {"nearest", Seam::kNearest}};
+
 constexpr Key<FillSettings> kFillKeys[] = {
     word<kPatterns, &FillSettings::pattern>(
         {"fill", "pattern", "--pattern", "PATTERN",
@@ -55,6 +59,8 @@ constexpr Key<FillSettings> kFillKeys[] = {
     field<&FillSettings::wall_width_mm>({"fill", "wall_width_mm", "", "MM", "width of a wall's bead; 0 for that of the others"},
                                         {0, 100, " mm"}),
     field<&FillSettings::walls>({"fill", "walls", "--walls", "N", "number of wall beads along the surface"}, kCount),
+    word<kSeams, &FillSettings::seam>({"fill", "seam", "--seam", "contour|aligned|rear|nearest", "where walls begin and end"})
+        .unsaid_at("contour"),
     field<&FillSettings::loops>({"fill", "loops", "", "N", "contour+raster: closed curves before the raster"}, kCount),
     field<&FillSettings::angle_deg>(
         {"fill", "angle_deg", "--angle", "DEG", "line direction of the first layer in degrees from x"}, kAngle),

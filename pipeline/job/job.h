@@ -79,6 +79,10 @@ struct ExtrudeRequest {
       fan_percent;
   std::optional<bool> relative_extrusion;
   std::optional<std::uint32_t> skirt_loops;
+  // --- of the first layer
+  double brim_mm = 0;                                        // width of loops around the parts
+  double elephant_foot_mm = 0;                               // by which contours are moved inwards
+  std::optional<double> first_thickness_mm, first_bead_mm;   // absent: as in the others
   std::string material;                                      // name of a material, or a file; empty: the printer's
   std::vector<std::pair<std::string, std::string>> machine;  // other profile keys with values: fan.from_layer, 2
 };

@@ -381,6 +381,17 @@ const JobKey kExtrudeKeys[] = {
     field<&Job::extrude, &ExtrudeRequest::skirt_loops>(
         {"extrude", "skirt_loops", "--skirt", "N", "number of skirt loops around all parts; 0: none", decides::moves},
         {0, 100}),
+    field<&Job::extrude, &ExtrudeRequest::brim_mm>(
+        {"extrude", "brim_mm", "--brim", "MM", "width of a brim around the parts in mm", decides::moves}, {0, 100, " mm"})
+        .unsaid_at("0"),
+    number<&ExtrudeRequest::first_thickness_mm>("first_thickness_mm", "--first-layer", "MM", kMinMm, 10,
+                                                "thickness of the first layer in mm"),
+    number<&ExtrudeRequest::first_bead_mm>("first_bead_mm", "--first-bead", "MM", 0.01, 100,
+                                           "bead width in the first layer in mm"),
+    field<&Job::extrude, &ExtrudeRequest::elephant_foot_mm>(
+        {"extrude", "elephant_foot_mm", "--elephant-foot", "MM", "inset of the first layer's outline in mm", decides::moves},
+        {0, 2, " mm"})
+        .unsaid_at("0"),
     machine_key()};
 
 // --- [load], [run]

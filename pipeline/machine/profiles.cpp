@@ -246,6 +246,7 @@ void complete_filling(Job& job) {
   if (fill.density_percent && fill.pattern == infill::Pattern::kNone && !is_named(job, "fill.pattern")) {
     fill.pattern = infill::Pattern::kGrid;
   }
+  if (fill.density_percent && !is_named(job, "fill.seam")) fill.seam = infill::Seam::kAligned;
   if (!is_named(job, "fill.walls")) fill.walls = fill.density_percent ? 2 : 1;
 }
 

@@ -71,7 +71,8 @@ Result<heights::Plan> decide_heights(const Job& job, const Scene& scene) {
   if (!options) return options.error();
   if (options->mode != heights::Mode::kUniform) return heights::plan_heights(index_scene(job, scene, *options), *options);
   heights::Plan plan;
-  plan.table = heights::LayerTable::uniform(scene.height, options->set.minimum());
+  plan.table = heights::LayerTable::uniform(scene.height, options->set.minimum(),
+                                            static_cast<Nm>(nm_of(job.extrude.first_thickness_mm.value_or(0))));
   return plan;
 }
 

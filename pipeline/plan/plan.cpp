@@ -385,10 +385,29 @@ Status choose_images(bool machine, Job& job) {
   return {};
 }
 
+/// errors  kUsage: a first layer of its own where layers differ, or lines are segmented
+Status check_first_layer(const Job& job) {
+  const ExtrudeRequest& request = job.extrude;
+  const bool uniform = job.heights.mode == heights::Mode::kUniform && !job.heights.per_part;
+  if (request.first_thickness_mm && !uniform)
+    return usage("extrude.first_thickness_mm: applies to layers of one thickness; leave it out, or --heights and --per-part");
+  if (request.brim_mm > 0 && job.heights.per_part)
+    return usage(
+        "extrude.brim_mm: with --per-part the first layers of parts are deposited one after the other; leave one of them out");
+  if (request.first_bead_mm && job.segment.any())
+    return usage("extrude.first_bead_mm: segmented lines have one width; leave it out");
+  return {};
+}
+
 }  // namespace
 
 Result<Resolved> resolve(const Job& job, Product product) {
   Resolved resolved{job, product, bare_bed(job), std::nullopt, std::nullopt};
+  if (product == Product::kMoves) {
+    if (Status status = check_first_layer(job); !status) return status.error();
+  } else {
+    resolved.job.extrude.first_thickness_mm.reset();
+  }
   if (product == Product::kImages) {
     if (job.heights.per_part) {
       return usage("--per-part: a powder bed has one table of layers for all parts; leave it out");

@@ -13,6 +13,7 @@
 #include "stages/geometry/boxes.h"
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
+#include "stages/infill/brim.h"
 #include "stages/infill/density.h"
 #include "stages/slice/bodies.h"
 
@@ -51,6 +52,11 @@ void FillPlan::set_beads(BeadShape shape, Nm nominal_thickness) {
   };
   set(base);
   for (FillInterval& range : ranges) set(range.parameters);
+}
+
+void FillPlan::set_width(Nm width) {
+  base.width = base.wall_width = width;
+  for (FillInterval& range : ranges) range.parameters.width = range.parameters.wall_width = width;
 }
 
 const infill::FillParameters& FillPlan::at(std::int64_t height) const {
@@ -109,6 +115,11 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   made.schedule_ = std::move(schedule);
   made.plans_ = std::move(fillings);
   made.fills_ = std::ranges::any_of(made.plans_, &FillPlan::fills);
+  made.elephant_foot_ = static_cast<Nm>(nm_of(job.extrude.elephant_foot_mm));
+  if (job.extrude.first_bead_mm) {
+    made.first_plans_ = made.plans_;
+    for (FillPlan& plan : made.first_plans_) plan.set_width(static_cast<Nm>(nm_of(*job.extrude.first_bead_mm)));
+  }
   made.containment_ = job.heights.containment;
   std::vector<Box> boxes;
   for (const Instance& instance : scene.instances) {
@@ -230,7 +241,8 @@ bool Sections::is_moved(const Area& copy, const Area& original, const Work& work
 }
 
 const infill::FillParameters& Sections::filling(const Area& area, const Layer& layer) const {
-  return plans_[area.part].at(height_in(area, layer));
+  const bool first = layer.bottom <= 0 && !first_plans_.empty();
+  return (first ? first_plans_ : plans_)[area.part].at(height_in(area, layer));
 }
 
 ContoursView Sections::contours_of(const Area& area, Work& work) const {
@@ -377,6 +389,14 @@ Result<std::shared_ptr<const Sections::SharedContours>> Sections::share(std::uin
   });
 }
 
+Result<infill::Outlines> Sections::outlines_of(const Area& area, const Layer& layer, Work& work) const {
+  const ContoursView contours = contours_of(area, work);
+  const infill::FillContext context{layer, area.box, of_walls_};
+  if (elephant_foot_ == 0 || layer.bottom > 0) return infill::outlines_of(contours, context, filling(area, layer));
+  const auto inset = infill::without_elephant_foot(contours, elephant_foot_, filling(area, layer).wall_width);
+  return inset ? infill::outlines_of(*inset, context, filling(area, layer)) : inset.error();
+}
+
 Status Sections::contours(std::uint32_t index, Work& work) const {
   const Layer own = schedule_.layers[index].own();
   auto scratch = scratches_->take();
@@ -413,7 +433,7 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
     work.original[a] = copy ? area.alike : a;
     work.outlines[a] = {};
     if (copy) continue;
-    auto outlines = infill::outlines_of(contours_of(area, work), {own, area.box, of_walls_}, filling(area, own));
+    auto outlines = outlines_of(area, own, work);
     if (!outlines) return failed(area, outlines.error());
     work.outlines[a] = std::move(*outlines);
     if (Status status = divide_skins(index, area, work.outlines[a]); !status) return failed(area, status.error());

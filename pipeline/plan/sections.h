@@ -34,6 +34,8 @@ struct FillPlan {
   const infill::FillParameters& at(std::int64_t height) const;
   /// For fillings by density: the cross-section of beads, and the thickness in which sparse lines have their width.
   void set_beads(BeadShape shape, Nm nominal_thickness);
+  /// All beads get a width.
+  void set_width(Nm width);
   /// Whether any layer has walls or a filling.
   bool fills() const;
 };
@@ -161,8 +163,10 @@ class Sections {
   std::vector<slice::Slicer> own_slicers_;    // by part, if each has its own layers
   std::vector<slice::Slicer> exact_slicers_;  // the same or one, without a tolerance; none if there is none anyway
   std::vector<std::string> names_;
-  std::vector<std::uint32_t> body_;  // by instance
-  std::vector<FillPlan> plans_;      // by [[part]]
+  std::vector<std::uint32_t> body_;    // by instance
+  std::vector<FillPlan> plans_;        // by [[part]]
+  std::vector<FillPlan> first_plans_;  // of first layers on the bed; empty: as the others
+  Nm elephant_foot_ = 0;
   std::vector<Area> areas_;
   std::vector<std::uint32_t> body_area_;      // bodies + 1, into areas_
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling
@@ -180,6 +184,7 @@ class Sections {
   void find_copies(const std::vector<std::uint32_t>& body);
   bool is_moved(const Area& copy, const Area& original, const Work& work) const;
   ContoursView contours_of(const Area& area, Work& work) const;
+  Result<infill::Outlines> outlines_of(const Area& area, const Layer& layer, Work& work) const;
   Error failed(const Area& area, const Error& error) const;
   Box bounds_;
   Nm grow_ = 0;              // of an offset outwards

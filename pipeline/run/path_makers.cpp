@@ -14,6 +14,8 @@
 #include "pipeline/report/path_observers.h"
 #include "stages/bead/even_starts.h"
 #include "stages/formats/extrusion_format.h"
+#include "stages/infill/brim.h"
+#include "stages/infill/density.h"
 #include "stages/infill/skirt.h"
 #include "stages/segment/moves.h"
 #include "stages/support/io/file.h"
@@ -21,20 +23,16 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Adds the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one, with beads or not.
-void deposit_skirt(const Plan& plan, const Layer& layer, formats::LayerMoves& out) {
-  const Extruder& machine = plan.moves->profile.machine;
-  const FillSettings& fill = plan.job.fill.all;
-  const auto width = static_cast<Nm>(nm_of(fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm));
-  const Contours skirt = infill::skirt_around(plan.sections->bounds(), machine.skirt, width,
-                                              {nm_of(machine.bed.size_mm[0]), nm_of(machine.bed.size_mm[1])});
+/// Adds lines, as fast and as wide as a wall.
+void deposit_lines(const Plan& plan, const Layer& layer, const Contours& lines, Nm width, formats::LayerMoves& out) {
   const segment::LayerCut uncut{};
-  segment::MoveTable table(plan.segments->base.plan, uncut, machine, layer);
-  for (std::uint32_t c = 0; c < skirt.size(); ++c) {
-    for (std::size_t i = 0; i + 1 < skirt[c].size(); ++i) {
+  segment::MoveTable table(plan.segments->base.plan, uncut, plan.moves->profile.machine, layer);
+  for (std::uint32_t c = 0; c < lines.size(); ++c) {
+    for (std::size_t i = 0; i + 1 < lines[c].size(); ++i) {
       PathInterval interval{};
-      interval.from = skirt[c][i];
-      interval.to = skirt[c][i + 1];
+      interval.from = lines[c][i];
+      interval.to = lines[c][i + 1];
+      if (interval.from == interval.to) continue;
       interval.kind = PathKind::kOuter;
       interval.width = width;
       interval.line = kNoLine;
@@ -42,6 +40,28 @@ void deposit_skirt(const Plan& plan, const Layer& layer, formats::LayerMoves& ou
       out.deposit({interval.from, interval.to, PathKind::kSkirt, i == 0, entry.width, entry.area, entry.speed});
     }
   }
+}
+
+/// Adds the skirt and the brim. The first layer of a job that begins at the bed has a skirt, with beads or not.
+/// errors  kInternal of Clipper
+Status deposit_around(const Plan& plan, const Layer& layer, const ContoursView& contours, formats::LayerMoves& out) {
+  const Extruder& machine = plan.moves->profile.machine;
+  const FillSettings& fill = plan.job.fill.all;
+  const ExtrudeRequest& request = plan.job.extrude;
+  const auto width =
+      static_cast<Nm>(nm_of(request.first_bead_mm.value_or(fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm)));
+  const std::array<std::int64_t, 2> bed{nm_of(machine.bed.size_mm[0]), nm_of(machine.bed.size_mm[1])};
+  const std::int64_t reach = nm_of(request.brim_mm);
+  const Box around = slice::grown(plan.sections->bounds(), static_cast<Nm>(reach));
+  deposit_lines(plan, layer, infill::skirt_around(around, machine.skirt, width, bed), width, out);
+  if (reach == 0 || layer.bottom > 0) return {};
+  infill::FillParameters parameters;
+  parameters.shape = machine.material.shape();
+  const double pitch = infill::solid_pitch(parameters, width, layer.thickness);
+  const auto brim = infill::brim_around(contours, {reach, width, pitch, static_cast<Nm>(nm_of(request.elephant_foot_mm))}, bed);
+  if (!brim) return brim.error();
+  deposit_lines(plan, layer, *brim, width, out);
+  return {};
 }
 
 ToolpathsView paths_of(const Sections::Work& work, std::uint32_t area) {
@@ -146,7 +166,9 @@ Result<bool> deposit_moves(const Plan& plan, std::uint32_t index, const Sections
   PoresByRange by_range(plan);
   const Extruder& machine = plan.moves->profile.machine;
   bead::EvenStarts starts(machine, mm(layer.thickness));
-  if (index == 0 && plan.sections->fills()) deposit_skirt(plan, layer, out);
+  if (index == 0 && plan.sections->fills()) {
+    if (Status status = deposit_around(plan, layer, work.contours.contours, out); !status) return status.error();
+  }
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
     const AreaCut of = cut_of(plan, a, layer);
     const SegmentRange& range = of.range;

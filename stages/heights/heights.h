@@ -4,6 +4,7 @@
 // parts and options give the same table for any number of threads.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -26,11 +27,14 @@ namespace lamina::heights {
 class LayerTable {
  public:
   /// height, thickness  nm, > 0
+  /// first  thickness of the first layer; 0: as the others
   /// The last layer counts even where it is only partly filled: ceil(height / thickness) layers.
-  static LayerTable uniform(std::int64_t height, Nm thickness) {
+  static LayerTable uniform(std::int64_t height, Nm thickness, Nm first = 0) {
     LayerTable table;
     table.thickness_ = thickness;
-    table.count_ = static_cast<std::uint32_t>(ceil_div<std::int64_t>(height, thickness));
+    table.first_ = first > 0 ? first : thickness;
+    const std::int64_t above = std::max<std::int64_t>(0, height - table.first_);
+    table.count_ = 1 + static_cast<std::uint32_t>(ceil_div<std::int64_t>(above, thickness));
     return table;
   }
   LayerTable() = default;
@@ -52,14 +56,15 @@ class LayerTable {
   std::uint32_t size() const { return count_; }
   Layer operator[](std::uint32_t index) const {
     if (thickness_ > 0) {
-      return {index, static_cast<Nm>(std::int64_t{index} * thickness_), thickness_, LayerReason::kUniform};
+      if (index == 0) return {0, 0, first_, LayerReason::kUniform};
+      return {index, static_cast<Nm>(first_ + (std::int64_t{index} - 1) * thickness_), thickness_, LayerReason::kUniform};
     }
     const LayerEntry& entry = entries_[index];
     return {index, entry.bottom, entry.thickness, entry.reason};
   }
   /// Where the last layer ends, nm.
   std::int64_t top() const {
-    if (thickness_ > 0) return std::int64_t{count_} * thickness_;
+    if (thickness_ > 0) return count_ == 0 ? 0 : first_ + (std::int64_t{count_} - 1) * thickness_;
     return count_ == 0 ? 0 : std::int64_t{entries_.back().bottom} + entries_.back().thickness;
   }
 
@@ -69,6 +74,7 @@ class LayerTable {
     LayerReason reason;
   };
   Nm thickness_ = 0;  // > 0: uniform, and nothing is stored
+  Nm first_ = 0;      // of a uniform table
   std::uint32_t count_ = 0;
   Buffer<LayerEntry> entries_;
 };

@@ -10,6 +10,7 @@
 #include "stages/infill/density.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/lines.h"
+#include "stages/infill/seam.h"
 
 namespace lamina::infill {
 namespace {
@@ -17,11 +18,13 @@ namespace {
 /// Beads below this are of no use: planners of printers use a lookahead of a few dozen moves.
 constexpr Nm kShortest = 50'000;
 
-/// A closed path: the first point comes again at the end.
-void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpaths& out, std::int32_t number = kNoLine) {
+/// Closed paths: the first point comes again at the end.
+void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpaths& out, std::int32_t number = kNoLine,
+                   Seam seam = Seam::kContour) {
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
-    for (const Point2 p : contours[c]) out.add(p, kind, width, number);
-    out.add(contours[c].front(), kind, width, number);
+    const auto points = contours[c];
+    const std::size_t first = seam_point(points, seam, out.point.empty() ? points.front() : out.point.back());
+    for (std::size_t i = 0; i <= points.size(); ++i) out.add(points[(first + i) % points.size()], kind, width, number);
     out.close();
   }
 }
@@ -251,7 +254,8 @@ Result<FillBound> bound_fill(const ContoursView& contours, const Outlines& outli
 
 Status append_fill(Outlines outlines, const FillContext& context, const FillParameters& parameters, Toolpaths& out) {
   for (std::size_t wall = 0; wall < outlines.walls.size(); ++wall) {
-    append_closed(outlines.walls[wall], wall == 0 ? PathKind::kOuter : PathKind::kInner, parameters.wall_width, out);
+    append_closed(outlines.walls[wall], wall == 0 ? PathKind::kOuter : PathKind::kInner, parameters.wall_width, out, kNoLine,
+                  parameters.seam);
   }
   if (parameters.density) return append_by_density(outlines, context, parameters, out);
   Contours& region = outlines.region;

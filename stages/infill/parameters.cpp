@@ -24,6 +24,7 @@ FillParameters parameters_of(const FillSettings& settings) {
   p.width = short_nm(settings.width_mm);
   p.wall_width = settings.wall_width_mm > 0 ? short_nm(settings.wall_width_mm) : p.width;
   p.walls = settings.walls;
+  p.seam = settings.seam;
   p.loops = settings.loops;
   p.angle_base = micro(settings.angle_deg);
   p.angle_step = micro(settings.angle_step_deg);

@@ -29,6 +29,7 @@ struct FillParameters {
   Nm width = 400'000;       // of a filling bead
   Nm wall_width = 400'000;  // of a wall's bead
   std::uint32_t walls = 1;  // contours along the surface; their centres at 1/2, 3/2, ... of wall_width inside it
+  Seam seam = Seam::kContour;
   std::uint32_t loops = 1;  // kContourRaster: closed curves before the raster
 
   // --- direction: angle_base + floor(layer / build_layers) * angle_step, modulo 360 degrees

@@ -21,6 +21,9 @@ enum class Pattern : std::uint8_t {
   kGyroid          // sections of a gyroid, a surface that divides space into two equal labyrinths; of a density only
 };
 
+/// Where the beads of walls begin (seam.h).
+enum class Seam : std::uint8_t { kContour, kAligned, kRear, kNearest };
+
 /// Whether a pattern is spaced by a density alone.
 constexpr bool needs_density(Pattern pattern) { return pattern >= Pattern::kLines; }
 
@@ -30,6 +33,7 @@ struct FillSettings {
   double width_mm = 0.4;
   double wall_width_mm = 0;  // 0: like width_mm
   std::uint32_t walls = 0;
+  Seam seam = Seam::kContour;
   std::uint32_t loops = 1;
   double angle_deg = 45, angle_step_deg = 90;
   std::uint32_t build_layers = 1;

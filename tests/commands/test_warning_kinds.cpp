@@ -39,6 +39,7 @@ const std::vector<WarningKind> kKinds = {
     {"offset", "slice peg.obj --layer 0.5 --offset -2", Page::kNone},
     {"no-bead", "extrude part.stl --bead 15 --skirt 1 --allow-empty" + kExtruded},
     {"voids", "extrude part.stl --fill raster --machine marlin --layer 0.2", Page::kHasItNot},
+    {"thin-walls", "extrude thin.stl part.stl --bead 0.8" + kExtruded, Page::kHasItNot},
     {"not-written", "slice part.stl --layer 1 --format 3mf --pattern raster --bead 1", Page::kNone},
     {"above-bed", "extrude part.stl --bottom 5" + kExtruded},
     {"empty", "jet part.stl --layer 100 --dpi 60 --allow-empty"},

@@ -40,6 +40,11 @@ Job unusual_job(const Directory& directory) {
   job.fill.all.bottom_mm = 0;
   job.fill.all.top_layers = 3;
   job.fill.all.bottom_layers = 0;
+  job.fill.all.seam = infill::Seam::kRear;
+  job.extrude.brim_mm = 4;
+  job.extrude.first_thickness_mm = 0.25;
+  job.extrude.first_bead_mm = 0.45;
+  job.extrude.elephant_foot_mm = 0.125;
   job.fill.ranges = {{1, 2.5, changes_of("{ gap_mm = 0, pattern = 'contour' }")}, {3, 4, {}}};
   job.segment.ranges = {{0, 1.5, {}}};
   job.extrude.material = directory / "own/resin.toml";

@@ -1,0 +1,73 @@
+// tests/infill/test_brim.cpp: loops around the first layer, and its inset.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/infill/brim.h"
+#include "tests/infill/outlines.h"
+
+namespace lamina::test {
+namespace {
+
+constexpr infill::BrimSettings kBrimSettings{5 * kMm, 400'000, 357'080, 0};
+constexpr std::array<std::int64_t, 2> kBrimBed{200 * kMm, 200 * kMm};
+
+double brim_length(const Contours& lines) {
+  double sum = 0;
+  for (std::uint32_t c = 0; c < lines.size(); ++c) {
+    for (std::size_t i = 1; i < lines[c].size(); ++i) {
+      const Point2 a = lines[c][i - 1], b = lines[c][i];
+      sum += std::hypot(mm(std::int64_t{b.x} - a.x), mm(std::int64_t{b.y} - a.y));
+    }
+  }
+  return sum;
+}
+
+// Loop k is a square of 20 mm and twice (k + 1/2) pitches: 14 of them are within 5 mm.
+TEST(Brim, LoopsAreAPitchApart) {
+  const Contours square = contours_of({{{50, 50}, {70, 50}, {70, 70}, {50, 70}}});
+  const auto brim = infill::brim_around(square, kBrimSettings, kBrimBed);
+  ASSERT_TRUE(brim.ok());
+  EXPECT_EQ(brim->size(), 14u);
+  double length = 0;
+  for (int k = 0; k < 14; ++k) length += 4 * (20 + 2 * (k + 0.5) * 0.35708);
+  EXPECT_NEAR(brim_length(*brim), length, 0.01);
+  const auto outermost = (*brim)[0];
+  EXPECT_NEAR(mm(std::ranges::min(outermost, {}, &Point2::x).x), 50 - 13.5 * 0.35708, 1e-5) << "the outer loop first";
+  for (std::uint32_t c = 0; c < brim->size(); ++c) EXPECT_EQ((*brim)[c].front(), (*brim)[c].back());
+}
+
+TEST(Brim, HasNoLoopInHolesAndOneAroundNeighbours) {
+  const Contours ring = contours_of({{{50, 50}, {70, 50}, {70, 70}, {50, 70}}, {{55, 55}, {55, 65}, {65, 65}, {65, 55}}});
+  EXPECT_EQ(infill::brim_around(ring, kBrimSettings, kBrimBed)->size(), 14u);
+  // 1 mm from each other: the first loop of each, and then one around both.
+  const Contours two = contours_of({{{50, 50}, {60, 50}, {60, 60}, {50, 60}}, {{61, 50}, {71, 50}, {71, 60}, {61, 60}}});
+  EXPECT_EQ(infill::brim_around(two, kBrimSettings, kBrimBed)->size(), 15u);
+}
+
+TEST(Brim, IsWithinTheBed) {
+  const Contours square = contours_of({{{1, 1}, {21, 1}, {21, 21}, {1, 21}}});
+  const auto brim = infill::brim_around(square, kBrimSettings, kBrimBed);
+  ASSERT_TRUE(brim.ok());
+  EXPECT_GT(brim->size(), 10u);
+  for (const Point2 p : brim->point) {
+    EXPECT_GE(p.x, 199'999);
+    EXPECT_GE(p.y, 199'999);
+  }
+}
+
+TEST(ElephantFoot, MovesEdgesInwardsWhereABeadStays) {
+  const Contours square = contours_of({{{0, 0}, {20, 0}, {20, 20}, {0, 20}}});
+  const auto inset = infill::without_elephant_foot(square, 150'000, 400'000);
+  ASSERT_TRUE(inset.ok());
+  EXPECT_NEAR(square_mm(doubled_area(*inset)), 19.7 * 19.7, 1e-6);
+  // A fin of 0.5 mm keeps its width.
+  const Contours finned = contours_of({{{0, 0}, {20, 0}, {20, 20}, {10.5, 20}, {10.5, 30}, {10, 30}, {10, 20}, {0, 20}}});
+  const auto kept = infill::without_elephant_foot(finned, 150'000, 400'000);
+  ASSERT_TRUE(kept.ok());
+  EXPECT_NEAR(square_mm(doubled_area(*kept)), 19.7 * 19.7 + 0.5 * 10.15, 0.06);
+}
+
+}  // namespace
+}  // namespace lamina::test
