@@ -157,7 +157,7 @@ Status append_solid(const Outlines& outlines, const FillContext& context, const 
   own.pattern = Pattern::kRaster;
   own.fills_corners = true;
   // Along edges that are nearly parallel to the lines, single beads fill what is left between the ends of lines.
-  own.longest_link = std::llround(3 * pitch);
+  own.longest_link = std::llround(1.5 * pitch);
   for_each_component(frame.to(outlines.solid_centres), [&](const ContoursView& component) {
     const SolidLines lines = solid_lines(component, pitch);
     own.width = static_cast<Nm>(nm_of(bead_width(lines.pitch * 1e-6 * height, height, parameters.shape)));
