@@ -23,7 +23,7 @@ bool is_moved_by(const ContoursView& copy, const ContoursView& original, Point2 
 }
 
 /// What hangs of a layer, body by body. Those with equal numbers of points may be copies: they are compared with one.
-Result<LayerOverhang> overhang_of(const slice::LayerContours& own, const slice::LayerContours& below, std::int64_t reach) {
+Result<Contours> overhang_of(const slice::LayerContours& own, const slice::LayerContours& below, std::int64_t reach) {
   struct Original {
     std::uint32_t body, begin, end;  // of its contours in the region
   };
@@ -61,7 +61,7 @@ Result<LayerOverhang> overhang_of(const slice::LayerContours& own, const slice::
     region.append(*found);
     if (added) known->second.end = region.size();
   }
-  return checks::measure_overhang(region);
+  return region;
 }
 
 }  // namespace
@@ -72,8 +72,13 @@ Overhangs::Overhangs(Sections& sections, double angle_deg, std::uint32_t neighbo
 }
 
 Result<LayerOverhang> Overhangs::at(std::uint32_t index) const {
+  const auto hanging = region(index);
+  return hanging ? checks::measure_overhang(*hanging) : Result<LayerOverhang>(hanging.error());
+}
+
+Result<Contours> Overhangs::region(std::uint32_t index) const {
   const std::optional<std::uint32_t> below = sections_.below(index);
-  if (!below && sections_.layers()[index].layer.bottom <= 0) return LayerOverhang();
+  if (!below && sections_.layers()[index].layer.bottom <= 0) return Contours();
   const auto own = sections_.exact_contours(index);
   if (!own) return own.error();
   if (!below) return overhang_of((*own)->contours, {}, 0);
@@ -116,7 +121,7 @@ Result<checks::OverhangTally> tally_overhangs(std::span<const Mesh> meshes, std:
       if (i >= begin && !on_bed) {
         const double distance = i == 0 ? 0 : static_cast<double>(planes[i]) - planes[i - 1];
         auto found = overhang_of(own, below, checks::overhang_reach(distance, angle_deg));
-        found ? void(overhangs[i] = std::move(*found)) : void(status[task] = found.error());
+        found ? void(overhangs[i] = checks::measure_overhang(*found)) : void(status[task] = found.error());
       }
       std::swap(own, below);
     }

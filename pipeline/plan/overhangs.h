@@ -21,6 +21,8 @@ class Overhangs {
   /// whole. Contours are compared with all their points, and copies of a body that are alike once. errors  of Slicer::layer and
   /// clipping.h
   Result<LayerOverhang> at(std::uint32_t index) const;
+  /// The region of it, clean contours but that they may touch. errors  as at()
+  Result<Contours> region(std::uint32_t index) const;
 
  private:
   const Sections& sections_;

@@ -13,6 +13,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/report/job_cost.h"
 #include "pipeline/show/report_head.h"
+#include "pipeline/show/report_overhangs.h"
 #include "pipeline/show/report_source.h"
 #include "pipeline/show/report_warnings.h"
 #include "stages/geometry/coverage.h"
@@ -128,9 +129,7 @@ Result<std::vector<ShownView>> build_up(const ReportSource& source, std::uint64_
   view::ThreeViews built(source.grid, window, lowest.bottom, highest.bottom + highest.thickness);
   const Status status = each_layer<std::vector<std::uint8_t>>(
       source, false, memory,
-      [&](std::uint32_t, const ReportLayer& layer, std::vector<std::uint8_t>& cells) {
-        built.inspect(layer.rows(), cells);
-      },
+      [&](std::uint32_t, const ReportLayer& layer, std::vector<std::uint8_t>& cells) { built.inspect(layer.rows(), cells); },
       [&](std::uint32_t position, const std::vector<std::uint8_t>& cells) { built.add(layers[position].layer, cells); });
   if (!status) return status.error();
   return views_of_layers(built);
@@ -169,6 +168,13 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
   auto detected = see_layers(*source, options.memory_bytes, report_warnings, held);
   if (!detected) return detected.error();
+  if (parts && manifest.head.product == Product::kMoves) {
+    auto overhangs = overhangs_of_job(manifest, job, *parts, source->box);
+    if (!overhangs) return overhangs.error();
+    overhangs->tally.warn(job.support_angle_deg, detected->warnings);
+    detected->overhang_mm2 = std::move(overhangs->area_mm2);
+    detected->positions = std::move(overhangs->positions);
+  }
   add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *detected);
   detected->deposited = options.deposited;
   detected->deposited_svg = options.deposited_svg;

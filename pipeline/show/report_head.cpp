@@ -45,6 +45,10 @@ Json layers_json(const Manifest& manifest, const ReportLayers& detected) {
   if (head.product == Product::kMoves) {
     column("volume", [&](const LayerRecord& r) { return r.paths ? rounded(r.paths->totals.volume_mm3) : 0; });
     column("filament", [&](const LayerRecord& r) { return r.paths ? rounded(r.paths->totals.filament_mm) : 0; });
+    if (!detected.overhang_mm2.empty()) {
+      columns["overhang"] = Json::array();
+      for (const double area : detected.overhang_mm2) columns["overhang"].push_back(rounded(area));
+    }
   } else if (!head.machine.empty()) {
     column("sweeps", [](const LayerRecord& r) { return r.program.sweeps; });
   }
@@ -97,9 +101,14 @@ void add(const Json& json, const Shown& shown, ReportLayers& detected) {
     if (warning.contains("layer")) reported.layer = shown.layer(warning.at("layer"));
   }
   const Json& found = json.at("inspection");
-  constexpr std::array<std::pair<const char*, const char*>, 8> kKinds = {
-      {{"islands", "mm2"}, {"loose", "mm3"}, {"hollows", "mm3"}, {"drains", "mm3"},
-       {"thin", "mm2"}, {"roofs", "mm2"}, {"gaps", "mm2"}, {"contacts", "mm2"}}};
+  constexpr std::array<std::pair<const char*, const char*>, 8> kKinds = {{{"islands", "mm2"},
+                                                                          {"loose", "mm3"},
+                                                                          {"hollows", "mm3"},
+                                                                          {"drains", "mm3"},
+                                                                          {"thin", "mm2"},
+                                                                          {"roofs", "mm2"},
+                                                                          {"gaps", "mm2"},
+                                                                          {"contacts", "mm2"}}};
   for (const auto& [code, unit] : kKinds) {
     if (!found.at(code).contains("locations")) continue;
     for (const Json& position : found.at(code).at("locations"))

@@ -37,8 +37,9 @@ struct ReportLocation {
 /// The result of one pass over all layers.
 struct ReportLayers {
   PixelWindow window;
-  std::vector<std::uint64_t> set;  // pixels of each
-  std::vector<double> seconds;     // of each, with a machine
+  std::vector<std::uint64_t> set;    // pixels of each
+  std::vector<double> seconds;       // of each, with a machine
+  std::vector<double> overhang_mm2;  // of each, of toolpaths whose parts are there; else empty
   std::vector<Warning> warnings;
   std::vector<ReportLocation> positions;
   std::string sweeps;                           // what drops of a pixel take of a head that fires several

@@ -158,7 +158,8 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
     return wrong(path, fmt::format("has {} layers, its manifest {}", opened->count(), manifest.layers.size()));
   }
   const auto file = std::make_shared<const formats::GcodeFile>(std::move(*opened));
-  source.grid = raster::bead_grid(file->box());
+  source.box = file->box();
+  source.grid = raster::bead_grid(source.box);
   std::vector<double> seconds;
   for (const LayerRecord& record : manifest.layers) seconds.push_back(record.paths ? record.paths->totals.seconds : 0);
   source.layer = [file, grid = source.grid, seconds](std::uint32_t position, bool) -> Result<ReportLayer> {

@@ -15,8 +15,8 @@
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
-#include "stages/geometry/bits.h"
 #include "stages/data/status.h"
+#include "stages/geometry/bits.h"
 #include "stages/view/cast.h"
 
 namespace lamina::pipeline {
@@ -33,6 +33,7 @@ struct ReportSource {
   std::string manifest_path;
   Manifest manifest;
   PixelGrid grid;                  // of the layers' runs
+  Box box;                         // of toolpaths: nm of the machine, of all beads; the grid begins at its corner
   std::optional<Machine> machine;  // that the job's programs are for
   /// A layer, by its place in the manifest; for any thread. timed: with the machine's seconds
   /// errors  kVerification: a file that is missing or differs from the manifest, a program that prints a different image

@@ -7,6 +7,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/manifest.h"
+#include "pipeline/plan/overhangs.h"
 #include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
 #include "stages/view/drawable_layers.h"
@@ -27,6 +28,8 @@ Result<LayerShapes> gcode_shapes(const formats::GcodeFile& file, const std::stri
                                file.states_widths() ? "" : fmt::format(", widths by {:g} mm filament", file.filament_mm()));
   return shapes;
 }
+
+constexpr Ink kOverhangInk{224, 62, 160};
 
 /// The source of a sliced job's drawing.
 struct SlicedJob {
@@ -60,6 +63,9 @@ Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
   }
   shapes.box = job.plan.sections->bounds();
   if (Status status = view::add_paths(work.paths, shapes); !status) return status.error();
+  auto overhang = Overhangs(*job.plan.sections, job.plan.job.support_angle_deg, 2).region(index);
+  if (!overhang) return overhang.error();
+  if (overhang->size() > 0) shapes.beads.push_back({kOverhangInk, "overhang", std::move(*overhang), ""});
   shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", job.name(), index, count, mm(shapes.z));
   shapes.caption =
       fmt::format("{} contour{}, {:.2f} mm2", shapes.contours.size(), shapes.contours.size() == 1 ? "" : "s", area);

@@ -83,10 +83,11 @@ TEST_F(Warnings, EmptyJobsAreRefusedUnlessAllowed) {
   refused("jet part.stl --layer 0.5 --machine nuferbj --bleed 9000 -o a", 3, {"--bleed"});
   refused("jet part.stl --layer 1 --dpi 60 --scale 0.001 -o a", 3, {"--dpi"});
   refused("extrude part.stl --machine anet-a8 --walls 0 --fill none -o a.gcode", 3, {"not one bead", "--walls"});
-  refused("extrude part.stl --machine anet-a8 --bead 15 -o a.gcode", 3, {"no bead fits"});
+  refused("extrude part.stl --machine anet-a8 --bead 45 -o a.gcode", 3, {"no bead fits"});
   refused("slice part.stl --layer 1 --offset -9 -o a", 3, {"not one contour", "--offset -9"});
   EXPECT_EQ(reported("jet part.stl --layer 100 --dpi 60 --allow-empty -o a"), Codes{"empty"});
-  EXPECT_EQ(reported("extrude part.stl --machine anet-a8 --walls 0 --fill none --allow-empty -o a.gcode"), (Codes{"no-bead", "empty"}));
+  EXPECT_EQ(reported("extrude part.stl --machine anet-a8 --walls 0 --fill none --allow-empty -o a.gcode"),
+            (Codes{"no-bead", "empty"}));
   EXPECT_EQ(reported("jet part.stl --layer 100 --dpi 60 --shard 1/1 -o s"), Codes()) << "shards may be empty";
   EXPECT_EQ(reported("jet part.stl --layer 100 --dpi 60 --layers 0: -o l"), Codes()) << "and some layers";
   write_text(directory_ / "empty.toml",

@@ -374,5 +374,6 @@ addPlot('file', 'bytes', layers.bytes);
 if (layers.seconds) addPlot('time, estimated', 's', layers.seconds);
 if (layers.sweeps) addPlot('sweeps', '', layers.sweeps);
 if (layers.filament) addPlot('filament', 'mm', layers.filament);
+if (layers.overhang) addPlot('overhang', 'mm²', layers.overhang);
 const ready = fromAddress().then(drawViews).then(() => { document.documentElement.dataset.ready = 'yes'; });
 window.laminaReport = { head, state, decodeLayer, showLayer, showLocation, ready };
