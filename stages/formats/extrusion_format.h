@@ -13,6 +13,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
+#include "stages/geometry/travel/edge_grid.h"
 
 namespace lamina::formats {
 
@@ -96,6 +97,12 @@ struct Switches {
   std::optional<std::uint32_t> fan;  // absent: the machine's from_layer
 };
 
+/// What is around the moves of a layer.
+struct LayerSurroundings {
+  const travel::EdgeGrid* region = nullptr;  // within the layer's contours, for travels; may be absent
+  Nm inset = 0;                              // distance from the contours at which travels follow them
+};
+
 /// Takes the moves of one layer, one after the other.
 class LayerMoves {
  public:
@@ -114,7 +121,9 @@ class ExtrusionFormat {
   /// Whether the machine can extrude layers of that thickness. errors  kUsage
   virtual Status check(const Layer& layer) const = 0;
   virtual void head(const ExtrusionHead& head, Buffer<char>& out) const = 0;
-  virtual std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out) const = 0;
+  /// around  must outlive what is returned
+  virtual std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out,
+                                            const LayerSurroundings& around = {}) const = 0;
   virtual void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const = 0;
   /// Of a travel between layers.
   virtual double travel_seconds(double length_mm) const = 0;
@@ -122,7 +131,8 @@ class ExtrusionFormat {
   /// Adds the travel from the layers before to a layer, whose writer does not know them.
   void travel_from(const MoveTotals& before, MoveTotals& layer) const {
     if (before.moves == 0 || layer.moves == 0) return;
-    const double length = std::hypot(mm(std::int64_t{layer.first.x} - before.last.x), mm(std::int64_t{layer.first.y} - before.last.y));
+    const double length =
+        std::hypot(mm(std::int64_t{layer.first.x} - before.last.x), mm(std::int64_t{layer.first.y} - before.last.y));
     layer.travel_mm += length;
     layer.seconds += travel_seconds(length);
   }
