@@ -144,8 +144,9 @@ Status ToolpathFile::open() {
   return {};
 }
 
-std::unique_ptr<formats::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffer<char>& text) const {
-  return format_->layer(layer, layers(), text);
+std::unique_ptr<formats::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffer<char>& text,
+                                                         const formats::LayerSurroundings& around) const {
+  return format_->layer(layer, layers(), text, around);
 }
 
 Result<std::uint64_t> ToolpathFile::finish(const formats::MoveTotals& totals) {

@@ -28,7 +28,8 @@ class ToolpathFile {
   const LayeredFile& file() const { return *file_; }
 
   /// Encodes the moves of a layer as text; from many threads at once, each with its own text.
-  std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
+  std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text,
+                                             const formats::LayerSurroundings& around) const;
 
   // --- from one thread at a time, in layer order
   /// Adds the travel from the layers before to a layer.

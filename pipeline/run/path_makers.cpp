@@ -12,6 +12,7 @@
 #include "pipeline/plan/overhangs.h"
 #include "pipeline/plan/segment.h"
 #include "pipeline/report/path_observers.h"
+#include "pipeline/run/travel_region.h"
 #include "stages/bead/even_starts.h"
 #include "stages/formats/extrusion_format.h"
 #include "stages/infill/skirt.h"
@@ -350,6 +351,7 @@ class MoveMaker : public Maker {
         {"fill", [this](std::uint32_t layer, const Ticket& ticket) { return plan_.sections->fill(layer, work_[ticket.work]); },
          [this](std::uint32_t layer, const Ticket& ticket) {
            auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {kTextOfPoint, 0, kTextOfPath});
+           if (bytes) *bytes += TravelRegion::bytes_bound(plan_, work_[ticket.work]);
            if (bytes && plan_.segments->any()) *bytes += 2 * kWaitingText;
            if (bytes && plan_.segments->crosses()) *bytes += *bytes + plan_.sections->bytes_bound(layer);  // the next layer too
            return bytes;
@@ -422,7 +424,8 @@ class MoveMaker : public Maker {
     made.facts = facts_of(work);
     made.facts.area_mm2 = checks_.add_contours(made.record.layer, work.contours);
     work.text.clear();
-    const auto out = file_.layer(made.record.layer, work.text);
+    const TravelRegion region(plan_, work);
+    const auto out = file_.layer(made.record.layer, work.text, region.surroundings());
     const std::size_t maximum =
         plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
     const auto deposited = deposit_moves(plan_, layer, work, {work.text, maximum, [] { return false; }}, *out, made.facts);
@@ -445,7 +448,8 @@ class MoveMaker : public Maker {
       piece_.clear();
       return status.ok();
     };
-    const auto out = file_.layer(made.record.layer, piece_);
+    const TravelRegion region(plan_, work);
+    const auto out = file_.layer(made.record.layer, piece_, region.surroundings());
     const auto deposited = deposit_moves(plan_, layer, work, {piece_, kPieceOfText, give}, *out, made.facts);
     if (!deposited) return deposited.error();
     if (!status) return status;
