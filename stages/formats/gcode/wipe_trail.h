@@ -15,6 +15,7 @@ namespace lamina::formats::gcode {
 class WipeTrail {
  public:
   static constexpr std::size_t kMaxPoints = 256;
+  static constexpr double kMinLine = 2e-3;  // mm: nearer points are left out, as files have whole micrometres
 
   void restart(Point2 at) {
     point_.clear();
@@ -29,17 +30,20 @@ class WipeTrail {
   /// returns  mm, at most `length_mm`
   template <class Visit>
   double back(double length_mm, const Visit& visit) const {
+    if (point_.empty()) return 0;
     double way = 0;
-    for (std::size_t i = point_.size(); i-- > 1 && way < length_mm;) {
-      const Point2 a = point_[i], b = point_[i - 1];
-      const double dx = mm(std::int64_t{b.x} - a.x), dy = mm(std::int64_t{b.y} - a.y), length = std::hypot(dx, dy);
-      if (!(length > 0)) continue;
+    Point2 at = point_.back();
+    for (std::size_t i = point_.size() - 1; i-- > 0 && way < length_mm;) {
+      const Point2 b = point_[i];
+      const double dx = mm(std::int64_t{b.x} - at.x), dy = mm(std::int64_t{b.y} - at.y), length = std::hypot(dx, dy);
+      if (length < kMinLine) continue;
       const double share = std::min(1.0, (length_mm - way) / length);
-      const Point2 to = share < 1 ? Point2{static_cast<Nm>(a.x + std::llround(dx * share * 1e6)),
-                                           static_cast<Nm>(a.y + std::llround(dy * share * 1e6))}
+      const Point2 to = share < 1 ? Point2{static_cast<Nm>(at.x + std::llround(dx * share * 1e6)),
+                                           static_cast<Nm>(at.y + std::llround(dy * share * 1e6))}
                                   : b;
       way += length * share;
       visit(to, length * share);
+      at = to;
     }
     return way;
   }
