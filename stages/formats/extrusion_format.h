@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stages/data/buffer.h"
 #include "stages/data/extruder.h"
@@ -84,11 +85,18 @@ inline FilamentUse filament_use(const MoveTotals& totals, const Extruder& machin
   return {mm3, mm3 * 1e-3 * machine.material.density_g_cm3};
 }
 
+/// What a firmware can leave out of a running print: parts that touch are one.
+struct ExtrusionObject {
+  std::string name;           // letters, digits, - and _; different ones
+  std::int64_t lo[2], hi[2];  // nm on the bed: x, y
+};
+
 struct ExtrusionHead {
   std::string program;  // "lamina 0.1.0"
   std::string source;   // names of the parts, one line
   std::uint32_t layers = 0;
   bool segmented = false;
+  std::vector<ExtrusionObject> objects = {};  // if the machine has tags of them
 };
 
 /// The layers of the file, from 0, with which settings of first layers end: parts with layers of their own have several.
@@ -97,10 +105,22 @@ struct Switches {
   std::optional<std::uint32_t> fan;  // absent: the machine's from_layer
 };
 
+/// mm
+inline double length_of(const BeadMove& move) {
+  const double dx = mm(std::int64_t{move.to.x} - move.from.x), dy = mm(std::int64_t{move.to.y} - move.from.y);
+  return std::sqrt(dx * dx + dy * dy);
+}
+
 /// What is around the moves of a layer.
 struct LayerSurroundings {
-  const travel::EdgeGrid* region = nullptr;  // within the layer's contours, for travels; may be absent
-  Nm inset = 0;                              // distance from the contours at which travels follow them
+  const travel::EdgeGrid* region = nullptr;               // within the layer's contours, for travels; may be absent
+  Nm inset = 0;                                           // distance from the contours at which travels follow them
+  bool segmented = false;                                 // widths of lines depend on their speed
+  const std::vector<ExtrusionObject>* objects = nullptr;  // those of the head; null: no tags
+  struct Progress {
+    int percent, minutes;  // of the time that is over, estimated; left
+  };
+  std::optional<Progress> progress = {};
 };
 
 /// Takes the moves of one layer, one after the other.
@@ -109,6 +129,8 @@ class LayerMoves {
   virtual ~LayerMoves() = default;
   /// Writes a move; returns its length in mm.
   virtual double deposit(const BeadMove& move) = 0;
+  /// The moves from here on are those of ExtrusionHead::objects[object].
+  virtual void begin_object(std::uint32_t) {}
   /// Ends the layer. returns its sums
   virtual const MoveTotals& finish() = 0;
 };

@@ -7,6 +7,8 @@
 #include <string_view>
 
 #include "stages/data/units.h"
+#include "stages/formats/gcode/host_tags.h"
+#include "stages/formats/gcode/slow_layer.h"
 #include "stages/support/text/decimal.h"
 
 namespace lamina::formats::gcode {
@@ -51,7 +53,8 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
       out_(out),
       time_(machine),
       height_(layer.thickness),
-      top_(std::int64_t{layer.bottom} + layer.thickness) {
+      top_(std::int64_t{layer.bottom} + layer.thickness),
+      objects_(around.objects) {
   const auto& retraction = machine.retraction;
   feed_per_volume_ = 1 / machine.material.mm3_of_e();
   corner_x_ = nm_of(machine.bed.corner_mm[0]);
@@ -64,6 +67,7 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
     route_.emplace(*around.region, around.inset, retraction.detour_mm * 1e6);
   }
   begin_layer(layer, layers, switches);
+  if (around.progress) append_progress(machine, layer.index, *around.progress, out_);
 }
 
 void LayerWriter::begin_layer(const Layer& layer, std::uint32_t layers, const Switches& switches) {
@@ -120,6 +124,14 @@ void LayerWriter::retract() {
   if (way > 0) wipe(written_ - (back_ - along), along);
   ++totals_.retractions;
   retracted_ = true;
+}
+
+/// Raises the nozzle over the layer.
+void LayerWriter::lift() {
+  if (lift_ == 0 || lifted_) return;
+  move_height(top_ + lift_);
+  time_.move({0, 0, mm(lift_), 0}, machine_.speed.lift_mm_s);
+  lifted_ = true;
 }
 
 /// Moves back along the bead and draws the filament back by `back`. The filament is no faster than in a retraction.
@@ -205,17 +217,30 @@ void LayerWriter::travel(Point2 to) {
   line_.clear();
   if (may_retract && !stays_inside(to)) {
     retract();
-    if (lift_ > 0) {
-      move_height(top_ + lift_);
-      time_.move({0, 0, mm(lift_), 0}, machine_.speed.lift_mm_s);
-      lifted_ = true;
-    }
+    lift();
   }
   if (line_.empty()) line_.push_back(to);
   for (const Point2 p : line_) travel_line(p);
   ++totals_.travels;
   trail_.restart(to);
   placed_ = true;
+}
+
+void LayerWriter::begin_object(std::uint32_t object) {
+  if (objects_ == nullptr || object_ == object) return;
+  end_object();
+  object_ = object;
+  append_object_tag(machine_, *objects_, object, true, out_);
+}
+
+/// An object begins and ends with the filament drawn back, so that it can be left out.
+void LayerWriter::end_object() {
+  if (!retracted_ && machine_.retraction.length_mm > 0) {
+    retract();
+    lift();
+  }
+  if (object_ >= 0) append_object_tag(machine_, *objects_, static_cast<std::uint32_t>(object_), false, out_);
+  object_ = -1;
 }
 
 void LayerWriter::travel_line(Point2 to) {
@@ -241,7 +266,7 @@ double LayerWriter::deposit(const BeadMove& move) {
   if (retracted_) prime();
   tags(move);
   const double dx = mm(std::int64_t{move.to.x} - move.from.x), dy = mm(std::int64_t{move.to.y} - move.from.y);
-  const double length = std::sqrt(dx * dx + dy * dy);
+  const double length = length_of(move);
   const double volume = length * move.area_mm2;
   append_written(out_, kMaxLine, [&](char* text) {
     text = put_fixed<3>(micrometres(move.to.x + corner_x_), put(text, "G1 X"));
@@ -261,6 +286,7 @@ double LayerWriter::deposit(const BeadMove& move) {
 
 const MoveTotals& LayerWriter::finish() {
   if (!retracted_ && machine_.retraction.length_mm > 0) retract();
+  if (object_ >= 0) end_object();
   if (totals_.moves > 0) totals_.last = at_;
   totals_.seconds = time_.halt();
   return totals_;
@@ -308,6 +334,7 @@ void append_head(const Extruder& machine, const ExtrusionHead& facts, Buffer<cha
                           "; machine: {}\n; parts: {}\n; layers: {}\n;FLAVOR:{}\n",
                           facts.program, machine.name, facts.source, facts.layers, machine.code.flavor));
   append(out, fill_code(machine.code.start, machine, facts.layers, 0, 0));
+  append_objects(machine, facts.objects, out);
   append(out, "G21 ; millimetres\nG90 ; absolute positions\n");
   append(out, machine.code.relative_extrusion ? "M83 ; relative extrusion\n" : "M82 ; absolute extrusion\n");
   append(out, "G92 E0\n");
@@ -353,6 +380,9 @@ class GcodeFormat final : public ExtrusionFormat {
   void head(const ExtrusionHead& head, Buffer<char>& out) const override { append_head(machine_, head, out); }
   std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out,
                                     const LayerSurroundings& around) const override {
+    if (machine_.fan.min_layer_s > 0) {
+      return std::make_unique<SlowLayer>(machine_, layer, layers, out, switches_, around);
+    }
     return std::make_unique<LayerWriter>(machine_, layer, layers, out, switches_, around);
   }
   void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const override {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stages/data/buffer.h"
 #include "stages/data/extruder.h"
@@ -26,14 +27,17 @@ class LayerWriter final : public LayerMoves {
   LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out,
               const Switches& switches = {}, const LayerSurroundings& around = {});
   double deposit(const BeadMove& move) override;
+  void begin_object(std::uint32_t object) override;
   const MoveTotals& finish() override;
 
  private:
+  void end_object();
   void begin_layer(const Layer& layer, std::uint32_t layers, const Switches& switches);
   void travel(Point2 to);
   void travel_line(Point2 to);
   bool stays_inside(Point2 to);
   void retract();
+  void lift();
   void wipe(std::int64_t from, std::int64_t back);
   void move_filament(std::int64_t from, std::int64_t to);
   void prime();
@@ -50,12 +54,14 @@ class LayerWriter final : public LayerMoves {
   std::int64_t lift_, back_;  // nm; retraction, 1e-5 mm
   bool lifted_ = false;
   WipeTrail trail_;
-  std::optional<travel::InsideRoute> route_;  // if there is a region
-  Buffer<Point2> line_;                       // the points of a travel
-  double feed_per_volume_;                    // mm of filament a mm3 of bead
-  double fed_ = 0;                            // mm of filament in this layer, exact
-  std::int64_t written_ = 0;                  // the same as far as it is written, 1e-5 mm
-  std::int64_t feed_rate_ = -1;               // mm/min as last written
+  const std::vector<ExtrusionObject>* objects_;  // null: no tags
+  std::int64_t object_ = -1;                     // under way; -1: none
+  std::optional<travel::InsideRoute> route_;     // if there is a region
+  Buffer<Point2> line_;                          // the points of a travel
+  double feed_per_volume_;                       // mm of filament a mm3 of bead
+  double fed_ = 0;                               // mm of filament in this layer, exact
+  std::int64_t written_ = 0;                     // the same as far as it is written, 1e-5 mm
+  std::int64_t feed_rate_ = -1;                  // mm/min as last written
   bool retracted_ = true, placed_ = false;
   Point2 at_{0, 0};
   std::int64_t corner_x_, corner_y_;  // nm
