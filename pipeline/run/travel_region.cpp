@@ -14,10 +14,15 @@ TravelRegion::TravelRegion(const Plan& plan, const Sections::Work& work) : plan_
   if (is_used(plan)) grid_.emplace(work.contours.contours);
 }
 
-formats::LayerSurroundings TravelRegion::surroundings() const {
+formats::LayerSurroundings TravelRegion::surroundings(
+    const std::optional<formats::LayerSurroundings::Progress>& progress) const {
   const FillSettings& fill = plan_.job.fill.all;
   const double width_mm = fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm;
-  return {grid_ ? &*grid_ : nullptr, static_cast<Nm>(nm_of(width_mm / 2))};
+  formats::LayerSurroundings around;
+  around.region = grid_ ? &*grid_ : nullptr;
+  around.inset = static_cast<Nm>(nm_of(width_mm / 2));
+  around.progress = progress;
+  return around;
 }
 
 std::uint64_t TravelRegion::bytes_bound(const Plan& plan, const Sections::Work& work) {

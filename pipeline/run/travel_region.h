@@ -18,7 +18,7 @@ class TravelRegion {
   TravelRegion(const Plan& plan, const Sections::Work& work);
   TravelRegion(const TravelRegion&) = delete;
   TravelRegion& operator=(const TravelRegion&) = delete;
-  formats::LayerSurroundings surroundings() const;
+  formats::LayerSurroundings surroundings(const std::optional<formats::LayerSurroundings::Progress>& progress) const;
 
   /// Upper bound of its memory, bytes.
   static std::uint64_t bytes_bound(const Plan& plan, const Sections::Work& work);

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
 
 #include "stages/data/buffer.h"
 #include "stages/data/extruder.h"
@@ -96,7 +96,7 @@ struct ExtrusionHead {
   std::string source;   // names of the parts, one line
   std::uint32_t layers = 0;
   bool segmented = false;
-  std::vector<ExtrusionObject> objects = {};  // if the machine has tags of them
+  std::span<const ExtrusionObject> objects = {};  // if the machine has tags of them
 };
 
 /// The layers of the file, from 0, with which settings of first layers end: parts with layers of their own have several.
@@ -113,11 +113,12 @@ inline double length_of(const BeadMove& move) {
 
 /// What is around the moves of a layer.
 struct LayerSurroundings {
-  const travel::EdgeGrid* region = nullptr;               // within the layer's contours, for travels; may be absent
-  Nm inset = 0;                                           // distance from the contours at which travels follow them
-  bool segmented = false;                                 // widths of lines depend on their speed
-  const std::vector<ExtrusionObject>* objects = nullptr;  // those of the head; null: no tags
+  const travel::EdgeGrid* region = nullptr;       // within the layer's contours, for travels; may be absent
+  Nm inset = 0;                                   // distance from the contours at which travels follow them
+  bool segmented = false;                         // widths of lines depend on their speed
+  std::span<const ExtrusionObject> objects = {};  // those of the head; none: no tags
   struct Progress {
+    std::uint32_t layer;   // of the file, from 1
     int percent, minutes;  // of the time that is over, estimated; left
   };
   std::optional<Progress> progress = {};

@@ -6,7 +6,7 @@
 
 namespace lamina::formats::gcode {
 
-void append_objects(const Extruder& machine, const std::vector<ExtrusionObject>& objects, Buffer<char>& out) {
+void append_objects(const Extruder& machine, std::span<const ExtrusionObject> objects, Buffer<char>& out) {
   if (objects.empty()) return;
   const bool klipper = machine.code.objects == "klipper", named = machine.code.flavor == "RepRap";
   if (!klipper) append(out, fmt::format("M486 T{}\n", objects.size()));
@@ -28,7 +28,7 @@ void append_objects(const Extruder& machine, const std::vector<ExtrusionObject>&
   if (!klipper && named) append(out, "M486 S-1\n");
 }
 
-void append_object_tag(const Extruder& machine, const std::vector<ExtrusionObject>& objects, std::uint32_t object, bool begins,
+void append_object_tag(const Extruder& machine, std::span<const ExtrusionObject> objects, std::uint32_t object, bool begins,
                        Buffer<char>& out) {
   if (machine.code.objects == "klipper") {
     append(out, fmt::format("EXCLUDE_OBJECT_{} NAME={}\n", begins ? "START" : "END", objects[object].name));
@@ -37,10 +37,9 @@ void append_object_tag(const Extruder& machine, const std::vector<ExtrusionObjec
   }
 }
 
-void append_progress(const Extruder& machine, std::uint32_t layer, const LayerSurroundings::Progress& progress,
-                     Buffer<char>& out) {
+void append_progress(const Extruder& machine, const LayerSurroundings::Progress& progress, Buffer<char>& out) {
   append(out, fmt::format("M73 P{} R{}\n", progress.percent, progress.minutes));
-  if (machine.code.flavor == "Klipper") append(out, fmt::format("SET_PRINT_STATS_INFO CURRENT_LAYER={}\n", layer + 1));
+  if (machine.code.flavor == "Klipper") append(out, fmt::format("SET_PRINT_STATS_INFO CURRENT_LAYER={}\n", progress.layer));
 }
 
 }  // namespace lamina::formats::gcode

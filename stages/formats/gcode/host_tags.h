@@ -11,7 +11,7 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <span>
 
 #include "stages/data/buffer.h"
 #include "stages/data/extruder.h"
@@ -20,12 +20,11 @@
 namespace lamina::formats::gcode {
 
 /// In the head, for machines with tags of objects.
-void append_objects(const Extruder& machine, const std::vector<ExtrusionObject>& objects, Buffer<char>& out);
+void append_objects(const Extruder& machine, std::span<const ExtrusionObject> objects, Buffer<char>& out);
 /// The start or the end of an object in a layer.
-void append_object_tag(const Extruder& machine, const std::vector<ExtrusionObject>& objects, std::uint32_t object, bool begins,
+void append_object_tag(const Extruder& machine, std::span<const ExtrusionObject> objects, std::uint32_t object, bool begins,
                        Buffer<char>& out);
 /// At the start of a layer.
-void append_progress(const Extruder& machine, std::uint32_t layer, const LayerSurroundings::Progress& progress,
-                     Buffer<char>& out);
+void append_progress(const Extruder& machine, const LayerSurroundings::Progress& progress, Buffer<char>& out);
 
 }  // namespace lamina::formats::gcode

@@ -67,7 +67,7 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
     route_.emplace(*around.region, around.inset, retraction.detour_mm * 1e6);
   }
   begin_layer(layer, layers, switches);
-  if (around.progress) append_progress(machine, layer.index, *around.progress, out_);
+  if (around.progress) append_progress(machine, *around.progress, out_);
 }
 
 void LayerWriter::begin_layer(const Layer& layer, std::uint32_t layers, const Switches& switches) {
@@ -227,10 +227,10 @@ void LayerWriter::travel(Point2 to) {
 }
 
 void LayerWriter::begin_object(std::uint32_t object) {
-  if (objects_ == nullptr || object_ == object) return;
+  if (objects_.empty() || object_ == object) return;
   end_object();
   object_ = object;
-  append_object_tag(machine_, *objects_, object, true, out_);
+  append_object_tag(machine_, objects_, object, true, out_);
 }
 
 /// An object begins and ends with the filament drawn back, so that it can be left out.
@@ -239,7 +239,7 @@ void LayerWriter::end_object() {
     retract();
     lift();
   }
-  if (object_ >= 0) append_object_tag(machine_, *objects_, static_cast<std::uint32_t>(object_), false, out_);
+  if (object_ >= 0) append_object_tag(machine_, objects_, static_cast<std::uint32_t>(object_), false, out_);
   object_ = -1;
 }
 
@@ -335,6 +335,9 @@ void append_head(const Extruder& machine, const ExtrusionHead& facts, Buffer<cha
                           facts.program, machine.name, facts.source, facts.layers, machine.code.flavor));
   append(out, fill_code(machine.code.start, machine, facts.layers, 0, 0));
   append_objects(machine, facts.objects, out);
+  if (machine.code.progress && machine.code.flavor == "Klipper") {
+    append(out, fmt::format("SET_PRINT_STATS_INFO TOTAL_LAYER={}\n", facts.layers));
+  }
   append(out, "G21 ; millimetres\nG90 ; absolute positions\n");
   append(out, machine.code.relative_extrusion ? "M83 ; relative extrusion\n" : "M82 ; absolute extrusion\n");
   append(out, "G92 E0\n");
@@ -359,6 +362,7 @@ std::string time_text(double seconds) {
 }
 
 void append_tail(const Extruder& machine, const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) {
+  if (machine.code.progress) append(out, "M73 P100 R0\n");
   append(out, fill_code(machine.code.end, machine, layers, layers == 0 ? 0 : layers - 1, 0));
   const FilamentUse use = filament_use(totals, machine);
   append(out,

@@ -6,8 +6,8 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
 
 #include "stages/data/buffer.h"
 #include "stages/data/extruder.h"
@@ -54,14 +54,14 @@ class LayerWriter final : public LayerMoves {
   std::int64_t lift_, back_;  // nm; retraction, 1e-5 mm
   bool lifted_ = false;
   WipeTrail trail_;
-  const std::vector<ExtrusionObject>* objects_;  // null: no tags
-  std::int64_t object_ = -1;                     // under way; -1: none
-  std::optional<travel::InsideRoute> route_;     // if there is a region
-  Buffer<Point2> line_;                          // the points of a travel
-  double feed_per_volume_;                       // mm of filament a mm3 of bead
-  double fed_ = 0;                               // mm of filament in this layer, exact
-  std::int64_t written_ = 0;                     // the same as far as it is written, 1e-5 mm
-  std::int64_t feed_rate_ = -1;                  // mm/min as last written
+  std::span<const ExtrusionObject> objects_;  // none: no tags
+  std::int64_t object_ = -1;                  // under way; -1: none
+  std::optional<travel::InsideRoute> route_;  // if there is a region
+  Buffer<Point2> line_;                       // the points of a travel
+  double feed_per_volume_;                    // mm of filament a mm3 of bead
+  double fed_ = 0;                            // mm of filament in this layer, exact
+  std::int64_t written_ = 0;                  // the same as far as it is written, 1e-5 mm
+  std::int64_t feed_rate_ = -1;               // mm/min as last written
   bool retracted_ = true, placed_ = false;
   Point2 at_{0, 0};
   std::int64_t corner_x_, corner_y_;  // nm
