@@ -477,7 +477,9 @@ class MoveMaker : public Maker {
     const auto drop = [&] { return text.clear(), true; };
     const auto deposited = deposit_moves(plan_, layer, work, {text, kPieceOfText, drop}, *out, facts);
     if (!deposited) return deposited.error();
-    return facts.totals.seconds;
+    formats::MoveTotals with_travel = facts.totals;  // from the layer below: as long as one from this layer's end to its start
+    file_.travel_from(facts.totals, with_travel);
+    return with_travel.seconds;
   }
 
   const Plan& plan_;
