@@ -12,6 +12,7 @@
 #include "pipeline/job/profiles/extruder.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_objects.h"
+#include "pipeline/output/thumbnail_text.h"
 #include "pipeline/plan/layers.h"
 #include "stages/formats/rp3/rp3.h"
 #include "stages/heights/evaluate.h"
@@ -135,8 +136,11 @@ Status ToolpathFile::open() {
   head.machine = machine.name;
   const std::string profile = pipeline::extruder_text(plan_.moves->profile);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
+  const auto [width, height] = machine.code.thumbnail_px;
+  const std::string picture = width > 0 && height > 0 ? thumbnail_text(*plan_.scene, width, height) : std::string();
   Buffer<char> start;
-  format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any(), objects_}, start);
+  format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any(), objects_, picture},
+                start);
   const bool streams = job.dry_run || is_stream(job.output);
   auto file = LayeredFile::open({job.dry_run ? "/dev/null" : job.output, manifest_path(job), job.resume && !job.dry_run,
                                  job.overwrite, job.sync, streams},

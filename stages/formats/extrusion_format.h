@@ -97,6 +97,7 @@ struct ExtrusionHead {
   std::uint32_t layers = 0;
   bool segmented = false;
   std::span<const ExtrusionObject> objects = {};  // if the machine has tags of them
+  std::string thumbnail = {};                     // lines of comments
 };
 
 /// The layers of the file, from 0, with which settings of first layers end: parts with layers of their own have several.
