@@ -29,7 +29,7 @@ struct MoveTotals {
   // The share of moves, beads, volume and filament that is not of the parts: skirts and prime lines.
   std::uint64_t auxiliary_moves = 0;
   double auxiliary_mm = 0, auxiliary_mm3 = 0, auxiliary_filament_mm = 0;
-  Point2 first{0, 0}, last{0, 0};  // the ends of all beads, if there are any
+  Point2 first{0, 0}, last{0, 0};  // where the first bead begins and the nozzle stops, if there are beads
   std::uint64_t part_moves() const { return moves - auxiliary_moves; }
 
   void add(const MoveTotals& other) {

@@ -12,10 +12,11 @@ struct GcodeStep {
   std::string command, type;
   int layer;
   double x0, y0, z0, x, y, z;
-  double fed;   // mm of filament, negative: drawn back
-  double back;  // drawn back in all, after the step
-  double feed;  // mm/min
-  bool moves() const { return x != x0 || y != y0; }
+  double fed;     // mm of filament, negative: drawn back
+  double back;    // drawn back in all, after the step
+  double feed;    // mm/min
+  bool over_bed;  // has an X or Y: beads shorter than a micrometre end where they begin
+  bool moves() const { return over_bed; }
 };
 
 /// The moves of the layers and, in `back_at_layer`, the filament that is drawn back at the start of each and at the end.
@@ -43,9 +44,10 @@ inline GcodeSteps read_steps(const std::string& text) {
     if (at.command == "M83") relative = true;
     if (at.command == "M82") relative = false;
     if (at.command != "G0" && at.command != "G1" && at.command != "G92") continue;
-    at.x0 = at.x, at.y0 = at.y, at.z0 = at.z, at.fed = 0;
+    at.x0 = at.x, at.y0 = at.y, at.z0 = at.z, at.fed = 0, at.over_bed = false;
     for (std::string word; words >> word;) {
       const double value = std::strtod(word.c_str() + 1, nullptr);
+      at.over_bed |= word[0] == 'X' || word[0] == 'Y';
       if (word[0] == 'X') at.x = value;
       if (word[0] == 'Y') at.y = value;
       if (word[0] == 'Z') at.z = value;

@@ -198,7 +198,7 @@ constexpr Key<Profile> kKeys[] = {
     field<kMachine, &Extruder::code, &Code::relative_extrusion>({"code", "relative_extrusion"}),
     field<kMachine, &Extruder::code, &Code::progress>({"code", "progress"}).unsaid_at("false"),
     text<check_objects, kMachine, &Extruder::code, &Code::objects>({"code", "objects"}).unsaid_at("none"),
-    field<kMachine, &Extruder::code, &Code::thumbnail_px>({"code", "thumbnail_px"}, {0, 1000, " pixels"}).unsaid_at("[0, 0]"),
+    field<kMachine, &Extruder::code, &Code::thumbnail_px>({"code", "thumbnail_px"}, {0, 1000, " pixels"}).unsaid_at("0,0"),
     code<&Extruder::code, &Code::start>("code", "start"),
     code<&Extruder::code, &Code::end>("code", "end"),
     code<&Extruder::code, &Code::layer>("code", "layer"),

@@ -119,9 +119,9 @@ void LayerWriter::move_filament(std::int64_t from, std::int64_t to) {
 void LayerWriter::retract() {
   const double wipe_mm = machine_.retraction.wipe_mm;
   const double way = wipe_mm > 0 ? trail_.back(wipe_mm, [](Point2, double) {}) : 0;
-  const std::int64_t along = way > 0 ? nearest(static_cast<double>(back_) * std::min(1.0, way / wipe_mm)) : 0;
+  const std::int64_t along = way > 0 ? drawn_after(way) : 0;
   if (along < back_ || !(way > 0)) move_filament(written_, written_ - (back_ - along));
-  if (way > 0) wipe(written_ - (back_ - along), along);
+  if (way > 0) wipe(written_ - (back_ - along));
   ++totals_.retractions;
   retracted_ = true;
 }
@@ -134,17 +134,22 @@ void LayerWriter::lift() {
   lifted_ = true;
 }
 
-/// Moves back along the bead and draws the filament back by `back`. The filament is no faster than in a retraction.
-void LayerWriter::wipe(std::int64_t from, std::int64_t back) {
+/// Filament drawn back over so many mm of a wipe, 1e-5 mm.
+std::int64_t LayerWriter::drawn_after(double way_mm) const {
+  return nearest(static_cast<double>(back_) * std::min(1.0, way_mm / machine_.retraction.wipe_mm));
+}
+
+/// Moves back along the bead and draws the filament back. from  where the filament is, 1e-5 mm. The filament is no faster than
+/// in a retraction.
+void LayerWriter::wipe(std::int64_t from) {
   const auto& retraction = machine_.retraction;
   const double speed = std::max(0.1, std::min(kWipeSpeed * machine_.speed.travel_mm_s,
                                               retraction.wipe_mm / retraction.length_mm * retraction.speed_mm_s));
   std::int64_t drawn = 0;
   double way = 0;
-  const double per_mm = static_cast<double>(back_) / retraction.wipe_mm;
   trail_.back(retraction.wipe_mm, [&](Point2 to, double length) {
     way += length;
-    const std::int64_t now = std::min(back, nearest(way * per_mm)), step = now - drawn;
+    const std::int64_t now = drawn_after(way), step = now - drawn;
     append_written(out_, kMaxLine, [&](char* text) {
       text = put_fixed<3>(micrometres(to.x + corner_x_), put(text, "G1 X"));
       text = put_fixed<3>(micrometres(to.y + corner_y_), put(text, " Y"));

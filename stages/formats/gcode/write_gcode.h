@@ -38,7 +38,8 @@ class LayerWriter final : public LayerMoves {
   bool stays_inside(Point2 to);
   void retract();
   void lift();
-  void wipe(std::int64_t from, std::int64_t back);
+  std::int64_t drawn_after(double way_mm) const;
+  void wipe(std::int64_t from);
   void move_filament(std::int64_t from, std::int64_t to);
   void prime();
   void move_height(std::int64_t height);
