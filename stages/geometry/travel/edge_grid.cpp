@@ -111,7 +111,7 @@ bool EdgeGrid::crosses(Point2 a, Point2 b) const {
   });
 }
 
-void EdgeGrid::crossings(Point2 a, Point2 b, Buffer<Crossing>& found) const {
+void EdgeGrid::crossings(Point2 a, Point2 b, Buffer<EdgeCrossing>& found) const {
   found.clear();
   if (next_.empty()) return;
   walk(a, b, [&](std::size_t cell) {

@@ -31,17 +31,14 @@ class EdgeGrid {
   bool crosses(Point2 a, Point2 b) const;
   /// Whether a point is in the region. Points on an edge count as either.
   bool contains(Point2 p) const;
-  /// Whether all of a line is within the region, and does not touch its edge.
-  bool has_inside(Point2 a, Point2 b) const { return !crosses(a, b) && contains(a); }
-
   /// An edge that a line meets. at  share of the line, 0 to 1, rounded
-  struct Crossing {
+  struct EdgeCrossing {
     double at;
     std::uint32_t edge;
-    friend auto operator<=>(const Crossing&, const Crossing&) = default;
+    friend auto operator<=>(const EdgeCrossing&, const EdgeCrossing&) = default;
   };
   /// All edges that a line meets, in its direction. found  replaced
-  void crossings(Point2 a, Point2 b, Buffer<Crossing>& found) const;
+  void crossings(Point2 a, Point2 b, Buffer<EdgeCrossing>& found) const;
 
   // An edge has the number of its first point.
   Point2 from(std::uint32_t edge) const { return contours_.point[edge]; }

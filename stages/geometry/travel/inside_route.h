@@ -30,7 +30,7 @@ class InsideRoute {
   const EdgeGrid* region_;
   Nm inset_;
   double detour_;
-  Buffer<EdgeGrid::Crossing> crossing_;
+  Buffer<EdgeGrid::EdgeCrossing> crossing_;
   Buffer<Point2> long_way_, route_;
 };
 
