@@ -15,7 +15,7 @@ namespace lamina::pipeline {
 /// layers, without travels between layers; between samples the time of a layer is interpolated.
 class ProgressEstimate {
  public:
-  static constexpr std::uint32_t kSamples = 32;
+  static constexpr std::uint32_t kAllUpTo = 500, kSamples = 64;
 
   ProgressEstimate() = default;
   /// first, end   layers of the file
