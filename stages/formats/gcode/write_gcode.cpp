@@ -208,11 +208,15 @@ void LayerWriter::tags(const BeadMove& move) {
   }
 }
 
-/// Whether the travel to a point may go on with the filament pressed. The points of its way are line_ then.
+/// Whether the travel to a point needs no retraction, as its points in the file do not cross a contour. They are line_ then.
 bool LayerWriter::stays_inside(Point2 to) {
   if (!route_) return false;
-  line_ = route_->find(at_, to);
-  return !line_.empty();
+  const auto written = [](Nm at, std::int64_t corner) { return static_cast<Nm>(1000 * micrometres(at + corner) - corner); };
+  const auto as_written = [&](Point2 p) { return Point2{written(p.x, corner_x_), written(p.y, corner_y_)}; };
+  line_ = route_->find(as_written(at_), as_written(to));
+  if (line_.empty()) return false;
+  line_.back() = to;
+  return true;
 }
 
 void LayerWriter::travel(Point2 to) {

@@ -7,6 +7,7 @@ namespace lamina::travel {
 namespace {
 
 constexpr std::size_t kMaxCrossings = 64;  // of a straight line that is replaced; more of them would make too long a route
+constexpr std::int64_t kGrid = 1000;       // nm: routes turn at whole micrometres, which files contain
 constexpr std::size_t kAhead = 8;          // points that may be left out where an inset folds over
 
 Point2 between(Point2 a, Point2 b, double share) {
@@ -29,7 +30,8 @@ void InsideRoute::add_inset(Point2 at, std::uint32_t edge, std::uint32_t other) 
     last_x = nx, last_y = ny;
   }
   const double scale = inset_ / std::max(0.5, 1 + cosine);
-  long_way_.push_back({static_cast<Nm>(std::llround(at.x + x * scale)), static_cast<Nm>(std::llround(at.y + y * scale))});
+  const auto whole = [](double nm) { return static_cast<Nm>(kGrid * std::llround(nm / kGrid)); };
+  long_way_.push_back({whole(at.x + x * scale), whole(at.y + y * scale)});
 }
 
 /// Adds the shorter way along the contour between the points of two of its edges. returns  false if both are too long
