@@ -85,8 +85,8 @@ class PrintProgram {
  private:
   /// compile(emit)  makes the sweeps
   template <class Compile>
-  Status write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work, ProgramRecord& record,
-               bool measures, const Compile& compile) const;
+  Status write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work, ProgramRecord& record, bool measures,
+               const Compile& compile) const;
   std::string path(std::string_view name) const;
   /// Of a layer.
   std::uint64_t max_sweeps(std::uint32_t drops) const;

@@ -135,8 +135,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
 void LayerImager::merge_section(ImageWork& work) const {
   if (work.section_bits && work.bits) {
     for (std::uint32_t r = 0; r < work.bits->rows(); ++r)
-      std::ranges::transform(work.bits->row(r), std::as_const(*work.section_bits).row(r), work.bits->row(r).begin(),
-                             std::bit_or());
+      std::ranges::transform(work.bits->row(r), std::as_const(*work.section_bits).row(r), work.bits->row(r).begin(), std::bit_or());
     work.section_bits.reset();
   } else if (work.section_bits || work.bits) {
     const Runs& others = work.section_bits ? work.runs : work.section;

@@ -20,14 +20,14 @@ namespace lamina::pipeline {
 /// Scratch for the images of a layer; reused by later layers.
 struct ImageWork {
   raster::LayerScratch scratch;
-  Runs runs;                             // the image of all materials
-  std::optional<BitImage> bits;          // in place of it, where runs would take more memory: LayerImager::keeps_bits()
-  Runs second;                           // of the other engine, mirrored, or before the dose
-  Runs third;                            // the core of a layer with a shell
-  Runs lowest, highest;                  // sections at both ends of the layer, if steps must lie inside or outside
-  Runs section;                          // of one solid of a layer with several materials
+  Runs runs;             // the image of all materials
+  std::optional<BitImage> bits;     // in place of it, where runs would take more memory: LayerImager::keeps_bits()
+  Runs second;           // of the other engine, mirrored, or before the dose
+  Runs third;            // the core of a layer with a shell
+  Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
+  Runs section;          // of one solid of a layer with several materials
   std::optional<BitImage> section_bits;  // in place of it
-  dose::DropWork drops;                  // if a saturation or fill fractions of voxels are requested
+  dose::DropWork drops;  // if a saturation or fill fractions of voxels are requested
   coverage::CoverageScratch coverage;
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own

@@ -54,7 +54,8 @@ SpaceNeed estimate_space(const Plan& plan) {
     record.layer = layer;
     ImageNotes notes;
     if (!imager.make(layer, work, record, notes)) continue;
-    if (!files.measure({work.runs, work.materials.image, work.drops.drops, work.drops.shares}, file_work, record)) continue;
+    if (!files.measure({work.runs, work.materials.image, work.drops.drops, work.drops.shares}, file_work, record))
+      continue;
     bytes += record.bytes + record.program.stored;
   }
   need.bytes = bytes / need.sampled * layers + layers * kBytesOfLayer;

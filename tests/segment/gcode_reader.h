@@ -28,13 +28,10 @@ struct GcodeFile {
   double drawn_back = 0, widest_retraction = 0;
   double lo_x = 1e9, lo_y = 1e9, hi_x = -1e9, hi_y = -1e9, hi_z = 0;  // of all moves within layers
   std::uint64_t lines = 0;
-  bool wipes = false;
 };
 
-/// wipes  moves may draw filament back
-inline GcodeFile read_gcode(const std::string& text, bool wipes = false) {
+inline GcodeFile read_gcode(const std::string& text) {
   GcodeFile file;
-  file.wipes = wipes;
   double x = 0, y = 0, z = 0, e = 0, feed = 0, width = 0;
   std::string type;
   bool relative = false;
@@ -95,9 +92,7 @@ inline GcodeFile read_gcode(const std::string& text, bool wipes = false) {
       if (file.drawn_back < -1e-6 && !file.layers.empty()) wrong("more filament pushed forth than was drawn back");
     }
     if (moves && !file.layers.empty()) {
-      if (given[3] && fed <= 0 && command == "G1" && file.wipes) {
-        file.drawn_back -= fed;
-      } else if (given[3]) {
+      if (given[3]) {
         if (fed < 0) wrong("a bead that draws filament back");
         if (file.drawn_back > 1e-9) wrong("a bead with the filament drawn back");
         if (feed <= 0) wrong("a bead before any speed");
