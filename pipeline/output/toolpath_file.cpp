@@ -11,6 +11,8 @@
 #include "pipeline/job/job.h"
 #include "pipeline/job/profiles/extruder.h"
 #include "pipeline/output/directory.h"
+#include "pipeline/output/print_objects.h"
+#include "pipeline/output/thumbnail_text.h"
 #include "pipeline/plan/layers.h"
 #include "stages/formats/rp3/rp3.h"
 #include "stages/heights/evaluate.h"
@@ -122,6 +124,7 @@ ToolpathFile::ToolpathFile(const Plan& plan)
     : plan_(plan),
       format_(formats::make_extrusion_format(
           plan.moves->profile.machine, {after_first(plan, 1), after_first(plan, plan.moves->profile.machine.fan.from_layer)})) {
+  if (plan.moves->profile.machine.code.objects != "none") objects_ = print_objects(*plan.sections);
 }
 
 Status ToolpathFile::open() {
@@ -133,8 +136,11 @@ Status ToolpathFile::open() {
   head.machine = machine.name;
   const std::string profile = pipeline::extruder_text(plan_.moves->profile);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
+  const auto [width, height] = machine.code.thumbnail_px;
+  const std::string picture = width > 0 && height > 0 ? thumbnail_text(*plan_.scene, width, height) : std::string();
   Buffer<char> start;
-  format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any()}, start);
+  format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any(), objects_, picture},
+                start);
   const bool streams = job.dry_run || is_stream(job.output);
   auto file = LayeredFile::open({job.dry_run ? "/dev/null" : job.output, manifest_path(job), job.resume && !job.dry_run,
                                  job.overwrite, job.sync, streams},
@@ -144,8 +150,12 @@ Status ToolpathFile::open() {
   return {};
 }
 
-std::unique_ptr<formats::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffer<char>& text) const {
-  return format_->layer(layer, layers(), text);
+std::unique_ptr<formats::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffer<char>& text,
+                                                         const formats::LayerSurroundings& around) const {
+  formats::LayerSurroundings all = around;
+  all.segmented = plan_.segments->any();
+  all.objects = objects_;
+  return format_->layer(layer, layers(), text, all);
 }
 
 Result<std::uint64_t> ToolpathFile::finish(const formats::MoveTotals& totals) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"
@@ -28,7 +29,9 @@ class ToolpathFile {
   const LayeredFile& file() const { return *file_; }
 
   /// Encodes the moves of a layer as text; from many threads at once, each with its own text.
-  std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
+  /// around  without objects, which are added; must outlive what is returned
+  std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text,
+                                             const formats::LayerSurroundings& around) const;
 
   // --- from one thread at a time, in layer order
   /// Adds the travel from the layers before to a layer.
@@ -42,6 +45,7 @@ class ToolpathFile {
   std::uint32_t layers() const { return plan_.range[1] - plan_.range[0]; }
 
   const Plan& plan_;
+  std::vector<formats::ExtrusionObject> objects_;
   std::unique_ptr<formats::ExtrusionFormat> format_;
   std::optional<LayeredFile> file_;
 };

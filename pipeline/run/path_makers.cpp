@@ -12,6 +12,8 @@
 #include "pipeline/plan/overhangs.h"
 #include "pipeline/plan/segment.h"
 #include "pipeline/report/path_observers.h"
+#include "pipeline/run/progress_estimate.h"
+#include "pipeline/run/travel_region.h"
 #include "stages/bead/even_starts.h"
 #include "stages/formats/extrusion_format.h"
 #include "stages/infill/brim.h"
@@ -172,6 +174,7 @@ Result<bool> deposit_moves(const Plan& plan, std::uint32_t index, const Sections
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
     const AreaCut of = cut_of(plan, a, layer);
     const SegmentRange& range = of.range;
+    if (work.path_area[a] < work.path_area[a + 1]) out.begin_object(plan.sections->areas()[a].body);
     const Result<segment::LayerCut>& cut = of.cut;
     if (!cut) return cut.error();
     segment::MoveTable table(range.plan, *cut, machine, layer);
@@ -354,6 +357,12 @@ class MoveMaker : public Maker {
 
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = file_.open(); !status) return status.error();
+    if (plan_.moves->profile.machine.code.progress) {
+      auto estimate =
+          ProgressEstimate::make(plan_.range[0], plan_.range[1], [&](std::uint32_t layer) { return seconds_of(layer); });
+      if (!estimate) return estimate.error();
+      progress_ = std::move(*estimate);
+    }
     std::vector<std::uint32_t> todo;
     const auto kept_count = static_cast<std::uint32_t>(file_.file().kept().size());
     for (std::uint32_t i = plan_.range[0] + kept_count; i < plan_.range[1]; ++i) todo.push_back(i);
@@ -372,7 +381,10 @@ class MoveMaker : public Maker {
         overhang_step(overhangs_, overhang_),
         {"fill", [this](std::uint32_t layer, const Ticket& ticket) { return plan_.sections->fill(layer, work_[ticket.work]); },
          [this](std::uint32_t layer, const Ticket& ticket) {
-           auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {kTextOfPoint, 0, kTextOfPath});
+           const bool slows = plan_.moves->profile.machine.fan.min_layer_s > 0;  // moves wait, and their text is made twice
+           const std::uint64_t of_point = slows ? 2 * kTextOfPoint + sizeof(BeadMove) : kTextOfPoint;
+           auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {of_point, 0, kTextOfPath});
+           if (bytes) *bytes += TravelRegion::bytes_bound(plan_, work_[ticket.work]);
            if (bytes && plan_.segments->any()) *bytes += 2 * kWaitingText;
            if (bytes && plan_.segments->crosses()) *bytes += *bytes + plan_.sections->bytes_bound(layer);  // the next layer too
            return bytes;
@@ -445,7 +457,8 @@ class MoveMaker : public Maker {
     made.facts = facts_of(work);
     made.facts.area_mm2 = checks_.add_contours(made.record.layer, work.contours);
     work.text.clear();
-    const auto out = file_.layer(made.record.layer, work.text);
+    const TravelRegion region(plan_, work);
+    const auto out = file_.layer(made.record.layer, work.text, region.surroundings(progress_.before(layer)));
     const std::size_t maximum =
         plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
     const auto deposited = deposit_moves(plan_, layer, work, {work.text, maximum, [] { return false; }}, *out, made.facts);
@@ -468,16 +481,34 @@ class MoveMaker : public Maker {
       piece_.clear();
       return status.ok();
     };
-    const auto out = file_.layer(made.record.layer, piece_);
+    const TravelRegion region(plan_, work);
+    const auto out = file_.layer(made.record.layer, piece_, region.surroundings(progress_.before(layer)));
     const auto deposited = deposit_moves(plan_, layer, work, {piece_, kPieceOfText, give}, *out, made.facts);
     if (!deposited) return deposited.error();
     if (!status) return status;
     return file_.file().append_piece({piece_.data(), piece_.size()});
   }
 
+  /// The time of a layer, which is planned and dropped for it. errors  of its steps
+  Result<double> seconds_of(std::uint32_t layer) const {
+    Sections::Work work;
+    if (Status status = plan_.sections->layer(layer, work); !status) return status.error();
+    Buffer<char> text;
+    PathFacts facts;
+    const TravelRegion region(plan_, work);
+    const auto out = file_.layer(plan_.layer(layer), text, region.surroundings({}));
+    const auto drop = [&] { return text.clear(), true; };
+    const auto deposited = deposit_moves(plan_, layer, work, {text, kPieceOfText, drop}, *out, facts);
+    if (!deposited) return deposited.error();
+    formats::MoveTotals with_travel = facts.totals;  // from the layer below: as long as one from this layer's end to its start
+    file_.travel_from(facts.totals, with_travel);
+    return with_travel.seconds;
+  }
+
   const Plan& plan_;
   JobChecks& checks_;
   ToolpathFile file_;
+  ProgressEstimate progress_;
   std::vector<Sections::Work> work_;
   std::vector<Made> made_;
   Overhangs overhangs_;

@@ -62,6 +62,10 @@ struct Extruder {
   struct Retraction {
     double length_mm = 1, speed_mm_s = 35;
     double min_travel_mm = 1.5;  // shorter travels are made without it
+    bool inside = false;         // travels that stay inside the contours of the layer are made without it
+    double detour_mm = 0;        // by which such a travel may be longer than its line; 0: lines only
+    double wipe_mm = 0;          // back along the bead while the filament is drawn back
+    double lift_mm = 0;          // of the nozzle, while it is drawn back
   } retraction;
 
   /// Beads before the first one of the part: the nozzle has oozed while it was heated and the axes were homed.
@@ -74,6 +78,9 @@ struct Extruder {
   struct Fan {
     double percent = 100;
     std::uint32_t from_layer = 1;  // counted from 0
+    std::uint32_t full_layer = 0;  // up to which the fan speeds up; at most from_layer: at once
+    double min_layer_s = 0;        // layers that take less have slower beads
+    double min_print_mm_s = 10;    // that these beads have at least
   } fan;
 
   struct Code {
@@ -81,6 +88,9 @@ struct Extruder {
     bool relative_extrusion = true;
     // In start, end and layer: {nozzle_degc} {bed_degc} {first_nozzle_degc} {first_bed_degc} {layer} {z} {layers}
     std::string start, end, layer;
+    bool progress = false;                            // M73 at every layer
+    std::string objects = "none";                     // tags of parts, which the firmware can skip: "m486" or "klipper"
+    std::array<std::uint32_t, 2> thumbnail_px{0, 0};  // picture of the parts at the start; 0: none
     std::string plain_pressure;  // switches pressure advance off: what segmented lines need, they live from its delay
   } code;
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "stages/data/buffer.h"
@@ -13,6 +14,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
+#include "stages/geometry/travel/edge_grid.h"
 
 namespace lamina::formats {
 
@@ -27,7 +29,7 @@ struct MoveTotals {
   // The share of moves, beads, volume and filament that is not of the parts: skirts and prime lines.
   std::uint64_t auxiliary_moves = 0;
   double auxiliary_mm = 0, auxiliary_mm3 = 0, auxiliary_filament_mm = 0;
-  Point2 first{0, 0}, last{0, 0};  // the ends of all beads, if there are any
+  Point2 first{0, 0}, last{0, 0};  // where the first bead begins and the nozzle stops, if there are beads
   std::uint64_t part_moves() const { return moves - auxiliary_moves; }
 
   void add(const MoveTotals& other) {
@@ -83,11 +85,19 @@ inline FilamentUse filament_use(const MoveTotals& totals, const Extruder& machin
   return {mm3, mm3 * 1e-3 * machine.material.density_g_cm3};
 }
 
+/// What a firmware can leave out of a running print: parts that touch are one.
+struct ExtrusionObject {
+  std::string name;           // letters, digits, - and _; different ones
+  std::int64_t lo[2], hi[2];  // nm on the bed: x, y
+};
+
 struct ExtrusionHead {
   std::string program;  // "lamina 0.1.0"
   std::string source;   // names of the parts, one line
   std::uint32_t layers = 0;
   bool segmented = false;
+  std::span<const ExtrusionObject> objects = {};  // if the machine has tags of them
+  std::string thumbnail = {};                     // lines of comments
 };
 
 /// The layers of the file, from 0, with which settings of first layers end: parts with layers of their own have several.
@@ -96,12 +106,33 @@ struct Switches {
   std::optional<std::uint32_t> fan;  // absent: the machine's from_layer
 };
 
+/// mm
+inline double length_of(const BeadMove& move) {
+  const double dx = mm(std::int64_t{move.to.x} - move.from.x), dy = mm(std::int64_t{move.to.y} - move.from.y);
+  return std::sqrt(dx * dx + dy * dy);
+}
+
+/// What is around the moves of a layer.
+struct LayerSurroundings {
+  const travel::EdgeGrid* region = nullptr;       // within the layer's contours, for travels; may be absent
+  Nm inset = 0;                                   // distance from the contours at which travels follow them
+  bool segmented = false;                         // widths of lines depend on their speed
+  std::span<const ExtrusionObject> objects = {};  // those of the head; none: no tags
+  struct Progress {
+    std::uint32_t layer;   // of the file, from 1
+    int percent, minutes;  // of the time that is over, estimated; left
+  };
+  std::optional<Progress> progress = {};
+};
+
 /// Takes the moves of one layer, one after the other.
 class LayerMoves {
  public:
   virtual ~LayerMoves() = default;
   /// Writes a move; returns its length in mm.
   virtual double deposit(const BeadMove& move) = 0;
+  /// The moves from here on are those of ExtrusionHead::objects[object].
+  virtual void begin_object(std::uint32_t) {}
   /// Ends the layer. returns its sums
   virtual const MoveTotals& finish() = 0;
 };
@@ -114,7 +145,9 @@ class ExtrusionFormat {
   /// Whether the machine can extrude layers of that thickness. errors  kUsage
   virtual Status check(const Layer& layer) const = 0;
   virtual void head(const ExtrusionHead& head, Buffer<char>& out) const = 0;
-  virtual std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out) const = 0;
+  /// around  must outlive what is returned
+  virtual std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out,
+                                            const LayerSurroundings& around = {}) const = 0;
   virtual void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const = 0;
   /// Of a travel between layers.
   virtual double travel_seconds(double length_mm) const = 0;
@@ -122,7 +155,8 @@ class ExtrusionFormat {
   /// Adds the travel from the layers before to a layer, whose writer does not know them.
   void travel_from(const MoveTotals& before, MoveTotals& layer) const {
     if (before.moves == 0 || layer.moves == 0) return;
-    const double length = std::hypot(mm(std::int64_t{layer.first.x} - before.last.x), mm(std::int64_t{layer.first.y} - before.last.y));
+    const double length =
+        std::hypot(mm(std::int64_t{layer.first.x} - before.last.x), mm(std::int64_t{layer.first.y} - before.last.y));
     layer.travel_mm += length;
     layer.seconds += travel_seconds(length);
   }

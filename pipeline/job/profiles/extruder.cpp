@@ -17,11 +17,14 @@ using Text = std::string_view;
 using Profile = ExtruderProfile;
 
 constexpr Text kFormats[] = {"gcode", "sml"}, kUses[] = {"raster", "contour", "support"},
-               kFlavors[] = {"Marlin", "RepRap", "Repetier", "Klipper"};
+               kFlavors[] = {"Marlin", "RepRap", "Repetier", "Klipper"}, kObjects[] = {"none", "m486", "klipper"};
 
 std::string check_format(Text text) { return text == "gcode" || text == "sml" ? std::string() : not_one_of(text, kFormats); }
 std::string check_flavor(Text text) {
   return std::ranges::find(kFlavors, text) != std::end(kFlavors) ? std::string() : not_one_of(text, kFlavors);
+}
+std::string check_objects(Text text) {
+  return std::ranges::find(kObjects, text) != std::end(kObjects) ? std::string() : not_one_of(text, kObjects);
 }
 std::string check_nothing(Text) { return {}; }
 std::string read_source(Text text, Profile& profile) {
@@ -175,6 +178,11 @@ constexpr Key<Profile> kKeys[] = {
     field<kMachine, &Extruder::retraction, &Retraction::length_mm>({"retraction", "length_mm"}, {0, 50, " mm"}),
     field<kMachine, &Extruder::retraction, &Retraction::speed_mm_s>({"retraction", "speed_mm_s"}, {0.1, 1000, " mm/s"}),
     field<kMachine, &Extruder::retraction, &Retraction::min_travel_mm>({"retraction", "min_travel_mm"}, {0, 1000, " mm"}),
+    field<kMachine, &Extruder::retraction, &Retraction::inside>({"retraction", "inside"}).unsaid_at("false"),
+    field<kMachine, &Extruder::retraction, &Retraction::detour_mm>({"retraction", "detour_mm"}, {0, 1000, " mm"})
+        .unsaid_at("0"),
+    field<kMachine, &Extruder::retraction, &Retraction::wipe_mm>({"retraction", "wipe_mm"}, {0, 50, " mm"}).unsaid_at("0"),
+    field<kMachine, &Extruder::retraction, &Retraction::lift_mm>({"retraction", "lift_mm"}, {0, 50, " mm"}).unsaid_at("0"),
 
     field<kMachine, &Extruder::skirt, &Skirt::loops>({"skirt", "loops"}, {0, 100}),
     field<kMachine, &Extruder::skirt, &Skirt::distance_mm>({"skirt", "distance_mm"}, {0, 100, " mm"}),
@@ -182,9 +190,15 @@ constexpr Key<Profile> kKeys[] = {
 
     field<kMachine, &Extruder::fan, &Fan::percent>({"fan", "percent"}, {0, 100, " %"}),
     field<kMachine, &Extruder::fan, &Fan::from_layer>({"fan", "from_layer"}, {0, 1'000'000}),
+    field<kMachine, &Extruder::fan, &Fan::full_layer>({"fan", "full_layer"}, {0, 1'000'000}).unsaid_at("0"),
+    field<kMachine, &Extruder::fan, &Fan::min_layer_s>({"fan", "min_layer_s"}, {0, 600, " s"}).unsaid_at("0"),
+    field<kMachine, &Extruder::fan, &Fan::min_print_mm_s>({"fan", "min_print_mm_s"}, kSpeed).unsaid_at("10"),
 
     text<check_flavor, kMachine, &Extruder::code, &Code::flavor>({"code", "flavor"}),
     field<kMachine, &Extruder::code, &Code::relative_extrusion>({"code", "relative_extrusion"}),
+    field<kMachine, &Extruder::code, &Code::progress>({"code", "progress"}).unsaid_at("false"),
+    text<check_objects, kMachine, &Extruder::code, &Code::objects>({"code", "objects"}).unsaid_at("none"),
+    field<kMachine, &Extruder::code, &Code::thumbnail_px>({"code", "thumbnail_px"}, {0, 1000, " pixels"}).unsaid_at("0,0"),
     code<&Extruder::code, &Code::start>("code", "start"),
     code<&Extruder::code, &Code::end>("code", "end"),
     code<&Extruder::code, &Code::layer>("code", "layer"),

@@ -41,7 +41,9 @@ constexpr ImportedKey kMaterialKeys[] = {
     {"material.first_nozzle_degc", {"first_layer_temperature", "nozzle_temperature_initial_layer"}},
     {"material.bed_degc", {"bed_temperature", "hot_plate_temp"}},
     {"material.first_bed_degc", {"first_layer_bed_temperature", "hot_plate_temp_initial_layer"}},
-    {"fan.from_layer", {"disable_fan_first_layers", "close_fan_the_first_x_layers"}}};
+    {"fan.from_layer", {"disable_fan_first_layers", "close_fan_the_first_x_layers"}},
+    {"fan.min_layer_s", {"slowdown_below_layer_time", "slow_down_layer_time"}},
+    {"fan.min_print_mm_s", {"min_print_speed", "slow_down_min_speed"}, {}, true}};
 /// Of all layers, and of the first.
 constexpr std::pair<const char*, const char*> kTemperatures[] = {{"material.nozzle_degc", "material.first_nozzle_degc"},
                                                                  {"material.bed_degc", "material.first_bed_degc"}};
@@ -57,6 +59,7 @@ constexpr ImportedKey kPrinterKeys[] = {
     {"retraction.min_travel_mm",
      {"filament_retract_before_travel", "filament_retraction_minimum_travel", "retract_before_travel",
       "retraction_minimum_travel"}},
+    {"retraction.lift_mm", {"filament_retract_lift", "filament_z_hop", "retract_lift", "z_hop"}},
     {"speed.print_mm_s", {"infill_speed", "sparse_infill_speed"}, {}, true},
     {"speed.inner_wall_mm_s", {"perimeter_speed", "inner_wall_speed"}, {}, true},
     {"speed.wall_mm_s", {"external_perimeter_speed", "outer_wall_speed"}, "speed.inner_wall_mm_s", true},
@@ -158,6 +161,8 @@ class ProfileImporter {
     if (Status status = set("bed.size_mm", pair_text(bed->size_mm), key); !status) return status;
     if (Status status = set("bed.corner_mm", pair_text(bed->corner_mm), key); !status) return status;
     if (Status status = set_all(kPrinterKeys); !status) return status;
+    machine.retraction.inside =
+        is_on("only_retract_when_crossing_perimeters", false) || is_on("reduce_infill_retraction", false);
     if (Status status = set_firmware(); !status) return status;
     const std::array<double, 2> end{bed->corner_mm[0] + bed->size_mm[0], bed->corner_mm[1] + bed->size_mm[1]};
     settings_.set("print_bed_min", pair_text(bed->corner_mm));  // names that code may use
@@ -168,6 +173,12 @@ class ProfileImporter {
     machine.description = fmt::format("{}; {:g} x {:g} x {:g} mm; {:g} mm nozzle", machine.code.flavor, machine.bed.size_mm[0],
                                       machine.bed.size_mm[1], machine.bed.build_height_mm, machine.material.nozzle_mm);
     return {};
+  }
+
+  /// The value of a switch; `unset` if it is absent.
+  bool is_on(std::string_view from, bool unset) {
+    const auto value = settings_.element(from);
+    return value ? *value == "1" || *value == "true" : unset;
   }
 
   Status set_firmware() {
@@ -220,6 +231,7 @@ class ProfileImporter {
 
   Status set_material() {
     if (Status status = set_all(kMaterialKeys); !status) return status;
+    if (!is_on("cooling", true) || !is_on("slow_down_for_layer_cooling", true)) profile_.machine.fan.min_layer_s = 0;
     for (const auto& [one, other] : kTemperatures) {
       if (Status status = copy_temperature(one, other); !status) return status;
       if (Status status = copy_temperature(other, one); !status) return status;

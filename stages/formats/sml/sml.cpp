@@ -106,7 +106,8 @@ class SmlFormat final : public ExtrusionFormat {
                             head.layers));
     if (!machine_.sml.header.empty()) append(out, machine_.sml.header + (machine_.sml.header.ends_with('\n') ? "" : "\n"));
   }
-  std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t, Buffer<char>& out) const override {
+  std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t, Buffer<char>& out,
+                                    const LayerSurroundings&) const override {
     return std::make_unique<SmlLayer>(machine_, layer, out);
   }
   double travel_seconds(double length_mm) const override { return length_mm / machine_.speed.travel_mm_s; }

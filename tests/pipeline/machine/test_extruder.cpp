@@ -43,5 +43,29 @@ TEST(Extruder, AnAccelerationIsStatedByAProfileOrAJobOnly) {
   EXPECT_FALSE(wrong.ok());
 }
 
+// The manifest of a job has the hash of the text, so keys that came later are left out at their defaults.
+TEST(Extruder, LaterKeysAreWrittenIfTheyWereSetAndReadBack) {
+  const std::string plain = "[machine]\nname = \"x\"\n";
+  const auto silent = pipeline::read_extruder(plain, "x.toml");
+  const auto set = pipeline::read_extruder(
+      plain +
+          "[retraction]\ninside = true\ndetour_mm = 20\nwipe_mm = 1.5\nlift_mm = 0.2\n[fan]\nfull_layer = 4\n"
+          "min_layer_s = 8\nmin_print_mm_s = 12\n[code]\nprogress = true\nobjects = \"klipper\"\nthumbnail_px = [220, 124]\n",
+      "x.toml");
+  ASSERT_TRUE(silent && set);
+  const std::string before = pipeline::extruder_text(*silent), after = pipeline::extruder_text(*set);
+  for (const char* key : {"inside", "detour_mm", "wipe_mm", "lift_mm", "full_layer", "min_layer_s", "min_print_mm_s",
+                          "progress", "objects", "thumbnail_px"}) {
+    EXPECT_EQ(before.find(std::string("\n") + key + " = "), std::string::npos) << key;
+    EXPECT_NE(after.find(std::string("\n") + key + " = "), std::string::npos) << key;
+  }
+  const auto again = pipeline::read_extruder(after, "again.toml");
+  ASSERT_TRUE(again);
+  EXPECT_EQ(pipeline::extruder_text(*again), after);
+  EXPECT_TRUE(again->machine.retraction.inside);
+  EXPECT_EQ(again->machine.code.thumbnail_px[1], 124u);
+  EXPECT_FALSE(pipeline::read_extruder(plain + "[code]\nobjects = \"all\"\n", "x.toml").ok());
+}
+
 }  // namespace
 }  // namespace lamina

@@ -168,6 +168,25 @@ TEST(ImportedProfiles, OfSectionsThatMultiplyAreRefusedInTime) {
   expect_refused_as(import_profile(bundle, "a.ini", {{"s39", ""}, false}), Fault::kUsage, "over more than 32 sections");
 }
 
+TEST(ImportedProfiles, TakeTravelsAndLayerTimes) {
+  const std::string bed = "bed_shape = 0x0,9x0,9x9,0x9\ntemperature = 200\n";
+  const auto machine_of = [&](const std::string& settings) {
+    return profile_of(import_profile(bed + settings, "a.ini", {})).machine;
+  };
+  const Extruder all = machine_of(
+      "retract_lift = 0.3\nonly_retract_when_crossing_perimeters = 1\ncooling = 1\nslowdown_below_layer_time = 7\n"
+      "min_print_speed = 15\n");
+  EXPECT_EQ(all.retraction.lift_mm, 0.3);
+  EXPECT_TRUE(all.retraction.inside);
+  EXPECT_EQ(all.fan.min_layer_s, 7);
+  EXPECT_EQ(all.fan.min_print_mm_s, 15);
+  const Extruder off = machine_of(
+      "only_retract_when_crossing_perimeters = 0\ncooling = 0\nslowdown_below_layer_time = 7\nmin_print_speed = 0\n");
+  EXPECT_FALSE(off.retraction.inside);
+  EXPECT_EQ(off.fan.min_layer_s, 0);
+  EXPECT_EQ(off.fan.min_print_mm_s, 10) << "0 is unset";
+}
+
 TEST(ImportedProfiles, OfAFilamentAreAMaterial) {
   const auto imported = import_profile(
       "temperature = 240\nfirst_layer_temperature = 230\nfilament_type = PETG\nfilament_cost = 25\n", "f.ini", {});
