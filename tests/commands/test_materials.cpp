@@ -61,10 +61,10 @@ double greatest_rate(const std::string& code) {
 }
 
 TEST_F(MaterialCommands, TheMeltRateLimitsTheSpeedOfBeadsAndOfNothingElse) {
-  const std::string limited = extruded("--material tpu --print-speed 90 --wall-speed 90");
+  const std::string limited = extruded("--material tpu --print-speed 90 --wall-speed 90 --machine-set fan.min_layer_s=0");
   EXPECT_NEAR(greatest_rate(limited), 2.5, 0.02);
   const std::string without =
-      extruded("--material tpu --print-speed 90 --wall-speed 90 --machine-set material.max_melt_mm3_s=0");
+      extruded("--material tpu --print-speed 90 --wall-speed 90 --machine-set fan.min_layer_s=0;material.max_melt_mm3_s=0");
   EXPECT_GT(greatest_rate(without), 5);
   EXPECT_EQ(extruded("--machine-set material.max_melt_mm3_s=1000"), extruded("")) << "a limit that no bead reaches";
 }
