@@ -1,0 +1,121 @@
+#include "pipeline/check/toolpaths.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "pipeline/machine/profiles.h"
+#include "stages/formats/gcode/write_gcode.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using formats::gcode::Defect;
+using formats::gcode::DefectCount;
+using formats::gcode::kDefects;
+
+/// "200 degC", or "205 to 210 degC".
+std::string range_text(const std::array<double, 2>& range) {
+  if (range[0] == range[1]) return fmt::format("{:g} degC", range[0]);
+  return fmt::format("{:g} to {:g} degC", range[0], range[1]);
+}
+
+}  // namespace
+
+Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOptions& options, Faults& faults) {
+  ToolpathCheck check;
+  std::optional<ExtruderProfile> profile;
+  if (!options.machine.empty()) {
+    auto found = find_extruder(options.machine, options.material);
+    if (!found) return found.error();
+    profile = std::move(*found);
+    check.machine = profile->machine.name;
+  }
+  auto replay = formats::gcode::replay_gcode(path, {profile ? &profile->machine : nullptr, options.filament_mm});
+  if (!replay) return replay.error();
+  check.replay = std::move(*replay);
+  for (std::size_t k = 0; k < kDefects; ++k) {
+    const auto kind = static_cast<Defect>(k);
+    const DefectCount& of = check.replay.defects[kind];
+    if (of.count == 0 || !is_fault(kind)) continue;
+    if (kind == Defect::kUnreadable) {
+      std::string text = check.replay.unreadable;
+      if (text.starts_with(path + ": ")) text.erase(0, path.size() + 2);
+      faults.add(std::move(text));
+    } else {
+      faults.add(defect_text(kind, of));
+    }
+  }
+  return check;
+}
+
+Summary::Lines ToolpathCheck::lines() const {
+  const formats::gcode::ReplayTotals& t = replay.totals;
+  Summary::Lines lines;
+  const auto line = [&](const char* name, std::string text) { lines.emplace_back(name, std::move(text)); };
+  line("layers", fmt::format("{}, {} beads, {:.2f} m; {} travels, {:.2f} m; {} retractions", readable_count(t.layers),
+                             readable_count(t.beads), t.bead_mm / 1000, readable_count(t.travels), t.travel_mm / 1000,
+                             readable_count(t.retractions)));
+  line("filament", fmt::format("{:.1f} mm of {:g} mm, {:.2f} cm3, {:.2f} g", t.filament_mm, t.diameter_mm, t.mm3 / 1000, t.grams));
+  const std::string stated =
+      t.stated_seconds > 0 ? fmt::format("; the file states {}", formats::gcode::time_text(t.stated_seconds)) : "";
+  line("printing", fmt::format("about {}{}", formats::gcode::time_text(t.seconds), stated));
+  if (t.nozzle_degc[1] > 0)
+    line("heat", fmt::format("nozzle {}, bed {}", range_text(t.nozzle_degc), range_text(t.bed_degc)));
+  line("speed", fmt::format("beads up to {:.1f} mm/s, travels up to {:.1f} mm/s, up to {:.2f} mm3/s (line {})", t.max_bead_mm_s,
+                            t.max_travel_mm_s, t.max_melt_mm3_s, t.max_melt_at.line));
+  line("box", fmt::format("{:.3f} to {:.3f}, {:.3f} to {:.3f}, {:.3f} to {:.3f} mm", t.low[0], t.high[0], t.low[1], t.high[1],
+                          t.low[2], t.high[2]));
+  for (std::size_t k = 0; k < kDefects; ++k) {
+    const auto kind = static_cast<Defect>(k);
+    const DefectCount& of = replay.defects[kind];
+    if (of.count > 0 && !is_fault(kind)) line("note", defect_text(kind, of));
+  }
+  return lines;
+}
+
+Json ToolpathCheck::json() const {
+  const formats::gcode::ReplayTotals& t = replay.totals;
+  Json defects = Json::array();
+  for (std::size_t k = 0; k < kDefects; ++k) {
+    const auto kind = static_cast<Defect>(k);
+    const DefectCount& of = replay.defects[kind];
+    if (of.count == 0) continue;
+    defects.push_back({{"kind", std::string(defect_name(kind))},
+                        {"fault", is_fault(kind)},
+                        {"count", of.count},
+                        {"line", of.first.line},
+                        {"layer", of.first.layer},
+                        {"value", of.value},
+                        {"limit", of.limit}});
+  }
+  Json json = {{"layers", t.layers},
+               {"beads", t.beads},
+               {"bead_mm", t.bead_mm},
+               {"travels", t.travels},
+               {"travel_mm", t.travel_mm},
+               {"retractions", t.retractions},
+               {"filament_mm", t.filament_mm},
+               {"volume_mm3", t.mm3},
+               {"grams", t.grams},
+               {"seconds", t.seconds},
+               {"stated_seconds", t.stated_seconds},
+               {"max_bead_mm_s", t.max_bead_mm_s},
+               {"max_travel_mm_s", t.max_travel_mm_s},
+               {"max_melt_mm3_s", t.max_melt_mm3_s},
+               {"nozzle_degc", Json::array()},
+               {"bed_degc", Json::array()},
+               {"low_mm", Json::array()},
+               {"high_mm", Json::array()},
+               {"defects", defects}};
+  for (const double degc : t.nozzle_degc) json["nozzle_degc"].push_back(degc);
+  for (const double degc : t.bed_degc) json["bed_degc"].push_back(degc);
+  for (const double at : t.low) json["low_mm"].push_back(at);
+  for (const double at : t.high) json["high_mm"].push_back(at);
+  if (!machine.empty()) json["machine"] = machine;
+  return json;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,37 @@
+// pipeline/check/toolpaths.h: checks a G-code file by a replay, and one of lamina against its plan.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/report/summary.h"
+#include "stages/data/extruder.h"
+#include "stages/data/status.h"
+#include "stages/formats/gcode/replay/replay.h"
+
+namespace lamina::pipeline {
+
+struct ToolpathOptions {
+  std::string machine, material;  // of `lamina extrude`; empty: no rules of a machine
+  double filament_mm = 0;         // diameter; 0: the file's
+};
+
+/// What a replay of a file found.
+struct ToolpathCheck {
+  formats::gcode::ReplayReport replay;
+  std::string machine;  // whose limits were compared; empty: none
+
+  /// Lines for people: sums, then a line for each kind of note.
+  Summary::Lines lines() const;
+  /// Sums, and all kinds of defects.
+  Json json() const;
+};
+
+/// Replays a file. Each kind of fault becomes one of `faults`.
+///
+/// errors  kUsage: no such machine; no G-code
+Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOptions& options, Faults& faults);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,70 @@
+#include "stages/formats/gcode/replay/filament_balance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::formats::gcode {
+
+void FilamentBalance::feed(double mm, bool absolute, FileLine at) {
+  if (mm == 0) return;
+  if (mm < 0) {
+    if (sum_ >= 0) ++retractions_;
+    if (-mm > step_.mm) step_ = {-mm, at, absolute};
+  } else {
+    fed_at_ = at;
+  }
+  sum_ += mm;
+  deepest_ = std::max(deepest_, -sum_);
+  open_ = true;
+}
+
+void FilamentBalance::forget() {
+  open_ = false;
+  exempt_ = true;
+  sum_ = deepest_ = 0;
+  step_ = {};
+}
+
+void FilamentBalance::bead(FileLine at, Defects& defects) {
+  if (!open_) return;
+  constexpr double kExact = 0.02, kBin = 0.02;  // mm
+  const double balance = sum_, deepest = deepest_;
+  const BackStep step = step_;
+  const bool exempt = exempt_;
+  forget();
+  exempt_ = false;
+  if (exempt) return;
+  if (std::abs(balance) <= kExact) usual_ = std::max(usual_, deepest);
+  // An E that jumps back by more than retractions do was counted from 0 without G92 E0.
+  if (step.absolute && -balance > kToleranceMm && step.mm > 1.5 * usual_ + 0.5) {
+    defects.add(Defect::kLostReset, step.at, step.mm, usual_);
+    return;
+  }
+  const auto same = [&](const PauseBalance& of) { return std::abs(of.mm - balance) <= kBin; };
+  auto* found = std::find_if(balances_.data(), balances_.data() + size_, same);
+  if (found == balances_.data() + size_) {
+    if (size_ == kBalances) {
+      found = std::min_element(balances_.data(), balances_.data() + size_, [&](const PauseBalance& a, const PauseBalance& b) {
+        return std::abs(a.mm - balance) < std::abs(b.mm - balance);
+      });
+    } else {
+      *found = {balance, 0, balance > 0 ? fed_at_ : at};
+      ++size_;
+    }
+  }
+  ++found->count;
+}
+
+void FilamentBalance::finish(Defects& defects) const {
+  const auto* end = balances_.data() + size_;
+  const auto* usual = std::max_element(
+      balances_.data(), end, [](const PauseBalance& a, const PauseBalance& b) { return a.count < b.count; });
+  if (usual == end) return;
+  for (const auto* one = balances_.data(); one != end; ++one) {
+    const double more = one->mm - usual->mm;
+    if (std::abs(more) <= kToleranceMm) continue;
+    defects.add(more > 0 ? Defect::kOverfed : Defect::kNotFedBack, one->first, std::abs(more), usual->mm, one->count);
+  }
+}
+
+}  // namespace lamina::formats::gcode

@@ -1,0 +1,156 @@
+#include "stages/formats/gcode/replay/layer_track.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::formats::gcode {
+namespace {
+
+constexpr double kSameHeight = 1e-4;  // mm
+constexpr double kGap = 0.5;          // of a layer's height, below it
+constexpr double kClosed = 0.5;       // mm between the ends of a wall
+
+}  // namespace
+
+BeadRole role_of(std::string_view type) {
+  struct RoleWord {
+    std::string_view part;
+    BeadRole role;
+  };
+  // The first part that the type contains decides: PrusaSlicer, Slic3r, lamina; Orca, BambuStudio; Cura.
+  constexpr RoleWord kParts[] = {{"upport", BeadRole::kSupport},          {"SUPPORT", BeadRole::kSupport},
+                                 {"kirt", BeadRole::kSupport},            {"SKIRT", BeadRole::kSupport},
+                                 {"Brim", BeadRole::kSupport},            {"tower", BeadRole::kSupport},
+                                 {"PRIME", BeadRole::kSupport},           {"Raft", BeadRole::kSupport},
+                                 {"Custom", BeadRole::kSupport},          {"xternal perimeter", BeadRole::kOuter},
+                                 {"verhang", BeadRole::kOuter},           {"uter wall", BeadRole::kOuter},
+                                 {"WALL-OUTER", BeadRole::kOuter},        {"erimeter", BeadRole::kInner},
+                                 {"nner wall", BeadRole::kInner},         {"WALL-INNER", BeadRole::kInner}};
+  for (const auto& [part, role] : kParts) {
+    if (type.find(part) != std::string_view::npos) return role;
+  }
+  return BeadRole::kOther;
+}
+
+void LayerTrack::begin_layer(std::uint64_t line) {
+  const std::uint32_t index = begun_ ? now_.index + 1 : 0;
+  now_ = TrackedLayer();
+  now_.index = index;
+  now_.line = line;
+  stated_z_ = -1;
+  begun_ = true;
+}
+
+void LayerTrack::tag(std::uint64_t line, Defects& defects) {
+  end_path(defects);
+  close_layer(defects);
+  tagged_ = true;
+  begin_layer(line);
+}
+
+bool LayerTrack::bead(const RawBead& bead, BeadRole role, double height, std::uint64_t line, Defects& defects) {
+  const bool flat = bead.from[2] == bead.to[2];
+  const double z = bead.to[2];
+  bool begins = false;
+  if (!tagged_ && (!begun_ || (flat && std::abs(z - now_.z) > kSameHeight))) {
+    close_layer(defects);
+    begin_layer(line);
+    begins = true;
+  }
+  const bool part = role != BeadRole::kSupport;
+  if (now_.beads++ == 0) {
+    now_.z = z;
+    now_.height = height;
+    now_.line = line;
+  } else if (tagged_ && flat && part && std::abs(z - now_.z) > 1.5 * (height > 0 ? height : 0.2) + 0.05) {
+    defects.add(Defect::kBeadHeight, {line, now_.index}, z, now_.z);
+  }
+  if (z < -kSameHeight) defects.add(Defect::kBelowBed, {line, now_.index}, z, 0);
+  now_.part = now_.part || part;
+  now_.outer = now_.outer || role == BeadRole::kOuter;
+  const bool wall = role == BeadRole::kOuter || role == BeadRole::kInner;
+  if (!wall || (path_ && (bead.from[0] != path_to_[0] || bead.from[1] != path_to_[1]))) end_path(defects);
+  if (!wall) return begins;
+  if (!path_) {
+    path_ = true;
+    path_line_ = line;
+    std::copy_n(bead.from, 2, path_from_);
+  }
+  std::copy_n(bead.to, 2, path_to_);
+  return begins;
+}
+
+void LayerTrack::end_path(Defects& defects) {
+  if (!path_) return;
+  path_ = false;
+  const double open = std::hypot(path_to_[0] - path_from_[0], path_to_[1] - path_from_[1]);
+  if (walls_close_ && open > kClosed) defects.add(Defect::kOpenWall, {path_line_, now_.index}, open, 0);
+}
+
+/// A layer of supports, skirts or a raft alone may have a gap above it.
+void LayerTrack::compare_rise(double rise, Defects& defects) {
+  if (gap_rise_ > 1.5 * rise) defects.add(Defect::kSkippedLayer, gap_, gap_z_, gap_below_);
+  gap_rise_ = 0;
+  if (empties_ > 0) {
+    defects.add(Defect::kEmptyLayer, empty_, empty_z_, 0, empties_);
+  } else if (now_.height > 0) {
+    if (below_.part && rise - now_.height > kGap * now_.height) {
+      defects.add(Defect::kSkippedLayer, now_.begin(), now_.z, top_);
+    }
+  } else if (below_.part && rise_ > 0 && rise > 1.5 * rise_) {
+    gap_ = now_.begin(), gap_z_ = now_.z, gap_below_ = top_, gap_rise_ = rise;
+  }
+}
+
+void LayerTrack::compare_heights(Defects& defects) {
+  if (!has_below_) {
+    if (now_.height > 0 && now_.z - now_.height > kGap * now_.height)
+      defects.add(Defect::kLateLayer, now_.begin(), now_.z, now_.height);
+    first_z_ = top_ = now_.z;
+  } else if (now_.z < below_.z - kSameHeight) {
+    // Parts one after another begin again at the bed.
+    if (now_.z > first_z_ + kSameHeight) {
+      defects.add(Defect::kLayerOrder, now_.begin(), now_.z, below_.z);
+    } else {
+      top_ = now_.z;
+    }
+    rise_ = gap_rise_ = 0;
+  } else if (now_.z > top_ + kSameHeight) {
+    const double rise = now_.z - top_;
+    compare_rise(rise, defects);
+    rise_ = rise;
+    top_ = now_.z;
+  }
+}
+
+void LayerTrack::compare_walls(Defects& defects) {
+  if (!now_.part) return;
+  if (now_.outer) {
+    if (wall_less_ > 0) defects.add(Defect::kNoWall, without_wall_, 0, 0, wall_less_);
+    wall_less_ = 0;
+    had_wall_ = true;
+  } else if (had_wall_) {
+    if (wall_less_++ == 0) without_wall_ = now_.begin();
+  }
+}
+
+void LayerTrack::close_layer(Defects& defects) {
+  if (!begun_) return;
+  if (now_.beads == 0) {
+    if (!has_below_) return;
+    if (empties_++ == 0) empty_ = now_.begin(), empty_z_ = std::max(stated_z_, 0.0);
+    return;
+  }
+  compare_heights(defects);
+  compare_walls(defects);
+  empties_ = 0;
+  below_ = now_;
+  has_below_ = true;
+}
+
+void LayerTrack::finish(Defects& defects) {
+  end_path(defects);
+  close_layer(defects);
+}
+
+}  // namespace lamina::formats::gcode
