@@ -457,17 +457,18 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     return false;
   }
   const std::string_view command = commands_;
+  const auto pass_text = [&] {
+    if (observer_ != nullptr) observer_->on_text(command);
+    return false;
+  };
   WordScanner scanner(std::exchange(commands_, {}));
   bool found = scanner.next();
   if (found && scanner.letter() == 'N') found = scanner.next();  // behind a line's number
-  if (!found) return false;
+  if (!found) return pass_text();
   char letter = scanner.letter();
   double code = scanner.value();
   const bool repeats = letter == 'E' || letter == 'F' || (letter >= 'X' && letter <= 'Z');
-  if (!scanner.has_number() || (!repeats && letter != 'G' && letter != 'M' && letter != 'T')) {
-    if (observer_ != nullptr) observer_->on_text(command);
-    return false;
-  }
+  if (!scanner.has_number() || (!repeats && letter != 'G' && letter != 'M' && letter != 'T')) return pass_text();
   if (letter == 'T') {
     change_tool(code);
     return pass_over(scanner, letter, code);

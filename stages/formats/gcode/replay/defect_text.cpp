@@ -21,6 +21,7 @@ constexpr DefectWords kWords[] = {
     {"lost-reset", "absolute E jumps back by {0:.3f} mm without G92 E0"},
     {"not-fed-back", "a bead begins with {0:.3f} mm of filament drawn back"},
     {"overfed", "{0:.3f} mm of filament more are fed than were drawn back"},
+    {"feeds-nothing", "{0:.1f} mm of filament are fed in all, {1:.1f} mm by beads; check M82 and M83"},
     {"layer-order", "the layer at z {0:.3f} mm follows one at {1:.3f} mm"},
     {"skipped-layer", "nothing is below the layer at z {0:.3f} mm; the one before is at {1:.3f} mm"},
     {"empty-layer", "the layer has no beads, and the next one has"},

@@ -16,6 +16,7 @@ enum class Defect : std::uint8_t {
   kLostReset,        // absolute E jumps back; value: mm of filament
   kNotFedBack,       // a bead begins while filament is drawn back; mm of filament
   kOverfed,          // more is fed than was drawn back; mm of filament
+  kFeedsNothing,     // M82 and M83 mistaken for each other; value: mm in all, limit: mm by moves that deposit
   kLayerOrder,       // a layer below the one before; value: z, limit: z of the one before
   kSkippedLayer,     // nothing below a layer; value: z, limit: the highest bead below
   kEmptyLayer,       // a layer without a bead between others; value: z

@@ -9,7 +9,7 @@ void FilamentBalance::feed(double mm, bool absolute, FileLine at) {
   if (mm == 0) return;
   if (mm < 0) {
     if (sum_ >= 0) ++retractions_;
-    if (-mm > step_.mm) step_ = {-mm, at, absolute};
+    step_ = {-mm, at, absolute};
   } else {
     fed_at_ = at;
   }
@@ -35,9 +35,9 @@ void FilamentBalance::bead(FileLine at, Defects& defects) {
   exempt_ = false;
   if (exempt) return;
   if (std::abs(balance) <= kExact) usual_ = std::max(usual_, deepest);
-  // An E that jumps back by more than retractions do was counted from 0 without G92 E0.
-  if (step.absolute && -balance > kToleranceMm && step.mm > 1.5 * usual_ + 0.5) {
-    defects.add(Defect::kLostReset, step.at, step.mm, usual_);
+  // An E that goes back by more than retractions do was counted from 0 without G92 E0.
+  if (step.absolute && -balance > 1.05 * usual_ + kToleranceMm) {
+    defects.add(Defect::kLostReset, step.at, -balance, usual_);
     return;
   }
   const auto same = [&](const PauseBalance& of) { return std::abs(of.mm - balance) <= kBin; };

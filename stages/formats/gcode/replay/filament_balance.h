@@ -14,7 +14,7 @@ namespace lamina::formats::gcode {
 /// are faults. Memory: a table of kBalances balances.
 class FilamentBalance {
  public:
-  static constexpr double kToleranceMm = 0.25;  // of filament
+  static constexpr double kToleranceMm = 0.1;  // of filament
 
   /// Filament that deposits nothing; mm, below 0: drawn back.
   void feed(double mm, bool absolute, FileLine at);
@@ -44,7 +44,7 @@ class FilamentBalance {
   double sum_ = 0, deepest_ = 0;  // since the last bead, mm
   double usual_ = 0;              // the deepest retraction that was fed again, mm
   FileLine fed_at_;               // the last one that fed
-  BackStep step_;                 // the longest one since the last bead
+  BackStep step_;                 // the last one since the last bead
   bool open_ = false, exempt_ = false;
   std::uint64_t retractions_ = 0;
 };

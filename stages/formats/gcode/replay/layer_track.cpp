@@ -9,6 +9,7 @@ namespace {
 constexpr double kSameHeight = 1e-4;  // mm
 constexpr double kGap = 0.5;          // of a layer's height, below it
 constexpr double kClosed = 0.5;       // mm between the ends of a wall
+constexpr double kJoined = 0.02;      // mm between beads of a wall
 
 }  // namespace
 
@@ -48,14 +49,12 @@ void LayerTrack::tag(std::uint64_t line, Defects& defects) {
   begin_layer(line);
 }
 
-bool LayerTrack::bead(const RawBead& bead, BeadRole role, double height, std::uint64_t line, Defects& defects) {
+void LayerTrack::bead(const RawBead& bead, BeadRole role, double height, std::uint64_t line, Defects& defects) {
   const bool flat = bead.from[2] == bead.to[2];
   const double z = bead.to[2];
-  bool begins = false;
   if (!tagged_ && (!begun_ || (flat && std::abs(z - now_.z) > kSameHeight))) {
     close_layer(defects);
     begin_layer(line);
-    begins = true;
   }
   const bool part = role != BeadRole::kSupport;
   if (now_.beads++ == 0) {
@@ -69,15 +68,15 @@ bool LayerTrack::bead(const RawBead& bead, BeadRole role, double height, std::ui
   now_.part = now_.part || part;
   now_.outer = now_.outer || role == BeadRole::kOuter;
   const bool wall = role == BeadRole::kOuter || role == BeadRole::kInner;
-  if (!wall || (path_ && (bead.from[0] != path_to_[0] || bead.from[1] != path_to_[1]))) end_path(defects);
-  if (!wall) return begins;
+  if (!wall || (path_ && std::hypot(bead.from[0] - path_to_[0], bead.from[1] - path_to_[1]) > kJoined)) end_path(defects);
+  if (!wall) return;
   if (!path_) {
     path_ = true;
     path_line_ = line;
     std::copy_n(bead.from, 2, path_from_);
   }
   std::copy_n(bead.to, 2, path_to_);
-  return begins;
+  return;
 }
 
 void LayerTrack::end_path(Defects& defects) {

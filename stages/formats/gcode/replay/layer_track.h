@@ -23,8 +23,7 @@ class LayerTrack {
   /// ;Z: of PrusaSlicer and lamina.
   void state_z(double z) { stated_z_ = z; }
   /// height  of tags; 0: not stated
-  /// returns  whether the bead begins a layer without a tag
-  bool bead(const RawBead& bead, BeadRole role, double height, std::uint64_t line, Defects& defects);
+  void bead(const RawBead& bead, BeadRole role, double height, std::uint64_t line, Defects& defects);
   /// A move that deposits nothing: what is deposited next is another path.
   void end_path(Defects& defects);
   void finish(Defects& defects);

@@ -126,6 +126,9 @@ class Replay final : public CommandObserver {
   LayerTrack layers_;
   PrintTime time_;
   double filament_mm2_ = 0, dwell_s_ = 0, travel_acceleration_ = 0;
+  double z_ = 0;              // of the last bead
+  double net_ = 0, fed_ = 0;  // mm of filament of all moves, and of those that deposit
+  FileLine back_;             // the first move that draws filament back along its way
   bool volumetric_ = false, homed_ = false;
 };
 
@@ -147,7 +150,7 @@ void Replay::begin_tagged() {
   // Of lamina's files the pause before the first bead has a balance too; others prime there.
   if (!totals_.own) balance_.forget();
   time_ = PrintTime(machine_);
-  dwell_s_ = 0;
+  dwell_s_ = net_ = fed_ = 0;
 }
 
 void Replay::on_move(const GcodeMove& move) {
@@ -161,9 +164,13 @@ void Replay::on_move(const GcodeMove& move) {
     balance_.bead(here(), defects_);
   } else {
     if (fed != 0) balance_.feed(fed, !now.relative_feed && !now.relative, here());
-    if (planar || dz != 0) layers_.end_path(defects_);
+    // Moves of a rounded micrometre deposit nothing and interrupt nothing.
+    if (std::hypot(dx, dy, dz) > 10 * kRounding) layers_.end_path(defects_);
   }
   if (!in_layers()) return;
+  net_ += fed;
+  if (deposits) fed_ += fed;
+  if (planar && fed < 0 && back_.line == 0) back_ = here();
   if (planar && !deposits) {
     const double length = std::hypot(dx, dy);
     ++totals_.travels;
@@ -197,7 +204,7 @@ void Replay::on_command(char letter, double code, const GcodeWords& words) {
 }
 
 void Replay::on_text(std::string_view command) {
-  if (command.empty()) return;
+  if (command.find_first_not_of(" \t") == std::string_view::npos) return;
   if (command.starts_with("TEMPERATURE_WAIT")) return heaters_.wait();
   if (!in_layers()) heaters_.macro();
 }
@@ -248,7 +255,8 @@ void Replay::check_section(double mm3, double length, double height) {
 void Replay::bead(const RawBead& raw) {
   const GcodeFile::FilePosition& now = walk_.position();
   const BeadRole role_of_bead = role();
-  if (layers_.bead(raw, role_of_bead, now.height, now.line, defects_)) deposited_.next_layer();
+  layers_.bead(raw, role_of_bead, now.height, now.line, defects_);
+  if (std::exchange(z_, raw.to[2]) != raw.to[2]) deposited_.next_layer();
   if (totals_.beads++ == 0) {
     check_first_bead();
     std::copy_n(raw.from, 3, totals_.low.begin());
@@ -283,6 +291,8 @@ void Replay::finish(ReplayReport& report) {
   layers_.finish(defects_);
   sections_.finish(defects_);
   balance_.finish(defects_);
+  // Relative numbers that are read as absolute go up and down.
+  if (fed_ > 0 && net_ < 0.2 * fed_) defects_.add(Defect::kFeedsNothing, back_, net_, fed_);
   if (heaters_.commanded() && heaters_.nozzle_degc(walk_.position().tool) > 0)
     defects_.add(Defect::kHeatersOn, here(), heaters_.nozzle_degc(walk_.position().tool), 0);
   totals_.layers = layers_.count();
@@ -304,7 +314,6 @@ ReplayReport Replay::run() {
     if (walk_.layer_tag) {
       if (!layers_.tagged()) begin_tagged();
       layers_.tag(walk_.position().line, defects_);
-      deposited_.next_layer();
     } else {
       bead(*raw);
     }
@@ -325,7 +334,7 @@ Result<ReplayReport> replay_gcode(const std::string& path, const ReplayOptions& 
   const HeadFacts facts = read_facts(*reader);
   auto replay = std::make_unique<Replay>(*reader, options, facts);
   ReplayReport report = replay->run();
-  if (report.totals.beads == 0 && report.unreadable.empty())
+  if (report.totals.beads == 0 && report.defects.faults() == 0)
     return Error{Fault::kUsage, path + ": no move extrudes filament; give a G-code file of an extrusion printer"};
   return report;
 }
