@@ -28,7 +28,7 @@ PRUSA = [
     ("am_coin_embossed_text.stl", 100, ["--layer-height", "0.1", "--first-layer-height", "0.2"]),
     ("dental_crown.stl", 200, ["--support-material", "--use-relative-e-distances"]),
     ("screw_cap_insert_threads.stl", 100, ["--raft-layers", "3", "--gcode-flavor", "marlin2"]),
-    ("motor_bracket.stl.gz", 100, ["--gcode-flavor", "klipper", "--use-relative-e-distances", "--infill-every-layers", "2"]),
+    ("motor_bracket.stl.gz", 100, ["--gcode-flavor", "smoothie", "--use-relative-e-distances", "--infill-every-layers", "2"]),
     ("stanford_bunny.stl", 60, ["--spiral-vase", "--perimeters", "1", "--top-solid-layers", "0", "--fill-density", "0"]),
     ("flexi_labrador_print_in_place.stl", 100, ["--brim-width", "5", "--gcode-flavor", "reprapfirmware"]),
     ("honeycomb_vase_1mm_wall.stl.gz", 60, ["--thin-walls", "--fill-pattern", "gyroid"]),
@@ -44,7 +44,7 @@ SLIC3R = [
     ("screw_cap_insert_threads.stl", 100, ["--raft-layers", "2"]),
     ("motor_bracket.stl.gz", 100, ["--infill-every-layers", "2", "--fill-pattern", "honeycomb"]),
     ("stanford_bunny.stl", 50, ["--spiral-vase", "--perimeters", "1", "--top-solid-layers", "0", "--fill-density", "0"]),
-    ("electronics_box_assembly_inch.stl", 100, ["--brim-width", "4", "--gcode-flavor", "repetier"]),
+    ("dental_crown.stl", 150, ["--brim-width", "4", "--gcode-flavor", "repetier"]),
     ("nist_am_test_artifact_v3b.stl", 50, ["--retract-lift", "0.4", "--retract-restart-extra", "0.05"]),
 ]
 CURA = [

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/formats/gcode/write_gcode.h"
 #include "stages/support/text/number_text.h"
@@ -22,17 +23,29 @@ std::string range_text(const std::array<double, 2>& range) {
   return fmt::format("{:g} to {:g} degC", range[0], range[1]);
 }
 
+/// The machine of a recorded job, if it is known here; else none.
+std::optional<ExtruderProfile> recorded_machine(const ManifestHead& head) {
+  Job job;
+  if (!read_job_text(head.job_toml, "manifest.json", job)) return std::nullopt;
+  auto found = resolve_extruder(job);
+  if (!found || found->machine.name != head.machine) return std::nullopt;
+  return std::move(*found);
+}
+
 }  // namespace
 
-Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOptions& options, Faults& faults) {
+Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOptions& options, const ManifestHead* head,
+                                      Faults& faults) {
   ToolpathCheck check;
   std::optional<ExtruderProfile> profile;
   if (!options.machine.empty()) {
     auto found = find_extruder(options.machine, options.material);
     if (!found) return found.error();
     profile = std::move(*found);
-    check.machine = profile->machine.name;
+  } else if (head != nullptr) {
+    profile = recorded_machine(*head);
   }
+  if (profile) check.machine = profile->machine.name;
   auto replay = formats::gcode::replay_gcode(path, {profile ? &profile->machine : nullptr, options.filament_mm});
   if (!replay) return replay.error();
   check.replay = std::move(*replay);
@@ -68,6 +81,12 @@ Summary::Lines ToolpathCheck::lines() const {
                             t.max_travel_mm_s, t.max_melt_mm3_s, t.max_melt_at.line));
   line("box", fmt::format("{:.3f} to {:.3f}, {:.3f} to {:.3f}, {:.3f} to {:.3f} mm", t.low[0], t.high[0], t.low[1], t.high[1],
                           t.low[2], t.high[2]));
+  if (!machine.empty()) line("machine", machine);
+  if (plan) {
+    line("plan", plan->reason.empty() ? fmt::format("{} beads planned again; {} missing, {} not planned, {} changed",
+                                                    readable_count(plan->planned), plan->missing, plan->added, plan->changed)
+                                      : "not compared: " + plan->reason);
+  }
   for (std::size_t k = 0; k < kDefects; ++k) {
     const auto kind = static_cast<Defect>(k);
     const DefectCount& of = replay.defects[kind];
@@ -115,6 +134,10 @@ Json ToolpathCheck::json() const {
   for (const double at : t.low) json["low_mm"].push_back(at);
   for (const double at : t.high) json["high_mm"].push_back(at);
   if (!machine.empty()) json["machine"] = machine;
+  if (plan) {
+    json["plan"] = {{"compared", plan->reason.empty()}, {"beads", plan->planned},   {"missing", plan->missing},
+                    {"added", plan->added},             {"changed", plan->changed}, {"reason", plan->reason}};
+  }
   return json;
 }
 

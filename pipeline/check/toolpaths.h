@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/check/planned_beads.h"
 #include "pipeline/report/summary.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
@@ -14,7 +15,8 @@
 namespace lamina::pipeline {
 
 struct ToolpathOptions {
-  std::string machine, material;  // of `lamina extrude`; empty: no rules of a machine
+  std::string machine, material;  // of `lamina extrude`; empty: the recorded ones, or no rules of a machine
+  std::vector<std::string> parts;  // folders or files of the parts of a file of lamina
   double filament_mm = 0;         // diameter; 0: the file's
 };
 
@@ -22,6 +24,7 @@ struct ToolpathOptions {
 struct ToolpathCheck {
   formats::gcode::ReplayReport replay;
   std::string machine;  // whose limits were compared; empty: none
+  std::optional<PlanComparison> plan;
 
   /// Lines for people: sums, then a line for each kind of note.
   Summary::Lines lines() const;
@@ -31,7 +34,9 @@ struct ToolpathCheck {
 
 /// Replays a file. Each kind of fault becomes one of `faults`.
 ///
+/// head    of the file's manifest, whose machine is used where options name none; null: it has none
 /// errors  kUsage: no such machine; no G-code
-Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOptions& options, Faults& faults);
+Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOptions& options, const ManifestHead* head,
+                                      Faults& faults);
 
 }  // namespace lamina::pipeline

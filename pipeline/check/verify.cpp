@@ -352,8 +352,8 @@ VerifyReport verify_paths(const std::string& name, const std::string& directory,
 }
 
 /// Replays a G-code file. errors  of check_toolpaths
-Status replay_file(const std::string& path, const VerifyOptions& options, VerifyReport& report) {
-  auto check = check_toolpaths(path, options.toolpaths, report);
+Status replay_file(const std::string& path, const VerifyOptions& options, const ManifestHead* head, VerifyReport& report) {
+  auto check = check_toolpaths(path, options.toolpaths, head, report);
   if (!check) return check.error();
   report.toolpaths = std::move(*check);
   return {};
@@ -366,7 +366,7 @@ Result<VerifyReport> verify_third_party(const std::string& path, const VerifyOpt
   report.recorded = false;
   std::error_code error;
   report.bytes = fs::file_size(path, error);
-  if (Status status = replay_file(path, options, report); !status) return status.error();
+  if (Status status = replay_file(path, options, nullptr, report); !status) return status.error();
   report.layers = report.toolpaths->replay.totals.layers;
   return report;
 }
@@ -391,7 +391,18 @@ Result<VerifyReport> verify_file(const std::string& path, const VerifyOptions& o
   const fs::path folder = fs::path(path).parent_path();
   VerifyReport report = verify_paths(path, folder.empty() ? "." : folder.string(), *manifest);
   if (options.quick || manifest->head.format != "gcode") return report;
-  if (Status status = replay_file(path, options, report); !status) report.add(status.error().message);
+  const bool as_recorded = report.ok();
+  if (Status status = replay_file(path, options, &manifest->head, report); !status) {
+    report.add(status.error().message);
+    return report;
+  }
+  // Equal bytes have equal beads; a difference of bytes is located by the plan.
+  if (as_recorded && options.toolpaths.parts.empty()) return report;
+  std::vector<std::string> folders = options.toolpaths.parts;
+  folders.insert(folders.end(), {".", folder.empty() ? "." : folder.string(), folder.parent_path().string()});
+  auto plan = compare_with_plan(path, manifest->head, folders, options.toolpaths.machine, report);
+  if (!plan) return plan.error();
+  report.toolpaths->plan = std::move(*plan);
   return report;
 }
 

@@ -112,7 +112,7 @@ TEST(GcodeReplay, ALostResetOfEIsAJumpBack) {
   const ReplayReport lost = replay(head + layer(0.2, "G92 E0\n") + layer(0.4, "G92 E0\n") + layer(0.6, "") + "M104 S0\n");
   EXPECT_EQ(found(lost), "lost-reset");
   EXPECT_EQ(lost.defects[Defect::kLostReset].first.layer, 2u);
-  EXPECT_NEAR(lost.defects[Defect::kLostReset].value, 5, 1e-9);
+  EXPECT_NEAR(lost.defects[Defect::kLostReset].value, 6, 1e-9);
 }
 
 TEST(GcodeReplay, BeadsAreDepositedOnce) {

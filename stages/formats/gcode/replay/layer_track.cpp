@@ -52,13 +52,16 @@ void LayerTrack::tag(std::uint64_t line, Defects& defects) {
 void LayerTrack::bead(const RawBead& bead, BeadRole role, double height, std::uint64_t line, Defects& defects) {
   const bool flat = bead.from[2] == bead.to[2];
   const double z = bead.to[2];
-  if (!tagged_ && (!begun_ || (flat && std::abs(z - now_.z) > kSameHeight))) {
+  if (!tagged_ && (!begun_ || std::abs(bead.from[2] - last_z_) > kSameHeight)) {
     close_layer(defects);
     begin_layer(line);
   }
   const bool part = role != BeadRole::kSupport;
+  last_z_ = z;
+  now_.top = now_.beads == 0 ? z : std::max(now_.top, z);
   if (now_.beads++ == 0) {
-    now_.z = z;
+    now_.z = bead.from[2];
+    now_.climbs = !flat;
     now_.height = height;
     now_.line = line;
   } else if (tagged_ && flat && part && std::abs(z - now_.z) > 1.5 * (height > 0 ? height : 0.2) + 0.05) {
@@ -83,42 +86,48 @@ void LayerTrack::end_path(Defects& defects) {
   if (!path_) return;
   path_ = false;
   const double open = std::hypot(path_to_[0] - path_from_[0], path_to_[1] - path_from_[1]);
-  if (walls_close_ && open > kClosed) defects.add(Defect::kOpenWall, {path_line_, now_.index}, open, 0);
+  if (rules_.walls_close && open > kClosed) defects.add(Defect::kOpenWall, {path_line_, now_.index}, open, 0);
 }
 
 /// A layer of supports, skirts or a raft alone may have a gap above it.
 void LayerTrack::compare_rise(double rise, Defects& defects) {
   if (gap_rise_ > 1.5 * rise) defects.add(Defect::kSkippedLayer, gap_, gap_z_, gap_below_);
   gap_rise_ = 0;
+  const bool may_gap = !below_.part || (rules_.raft_layers > 0 && below_.index <= rules_.raft_layers);
   if (empties_ > 0) {
     defects.add(Defect::kEmptyLayer, empty_, empty_z_, 0, empties_);
   } else if (now_.height > 0) {
-    if (below_.part && rise - now_.height > kGap * now_.height) {
-      defects.add(Defect::kSkippedLayer, now_.begin(), now_.z, top_);
-    }
-  } else if (below_.part && rise_ > 0 && rise > 1.5 * rise_) {
+    if (!may_gap && rise - now_.height > kGap * now_.height) defects.add(Defect::kSkippedLayer, now_.begin(), now_.z, top_);
+  } else if (!may_gap && rise_ > 0 && rise > 1.5 * rise_) {
     gap_ = now_.begin(), gap_z_ = now_.z, gap_below_ = top_, gap_rise_ = rise;
   }
 }
 
 void LayerTrack::compare_heights(Defects& defects) {
+  // Cura's layer_0_z_overlap lowers all layers above the first one on a raft by a part of a layer.
+  const double lower = std::max(kSameHeight, now_.height > 0 ? 0.5 * now_.height : 0.25 * rise_);
   if (!has_below_) {
     if (now_.height > 0 && now_.z - now_.height > kGap * now_.height)
       defects.add(Defect::kLateLayer, now_.begin(), now_.z, now_.height);
-    first_z_ = top_ = now_.z;
-  } else if (now_.z < below_.z - kSameHeight) {
+    first_z_ = now_.z;
+    top_ = now_.top;
+  } else if (now_.z < below_.z - lower) {
     // Parts one after another begin again at the bed.
     if (now_.z > first_z_ + kSameHeight) {
       defects.add(Defect::kLayerOrder, now_.begin(), now_.z, below_.z);
     } else {
-      top_ = now_.z;
+      top_ = now_.top;
     }
     rise_ = gap_rise_ = 0;
-  } else if (now_.z > top_ + kSameHeight) {
+  } else {
     const double rise = now_.z - top_;
-    compare_rise(rise, defects);
-    rise_ = rise;
-    top_ = now_.z;
+    if (!now_.climbs && rise > kSameHeight) {
+      compare_rise(rise, defects);
+      rise_ = rise;
+    } else if (now_.climbs && (rise > rules_.nozzle_mm || (tagged_ && now_.top - now_.z > 1.5 * rules_.nozzle_mm))) {
+      defects.add(Defect::kSkippedLayer, now_.begin(), now_.top, top_);
+    }
+    top_ = std::max(top_, now_.top);
   }
 }
 

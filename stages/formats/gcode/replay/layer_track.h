@@ -13,10 +13,16 @@ namespace lamina::formats::gcode {
 enum class BeadRole : std::uint8_t { kOther, kOuter, kInner, kSupport };
 BeadRole role_of(std::string_view type);
 
-/// Takes the beads of a file by layers. Layers begin at tags; without them where a flat bead is at another height than the one before.
+/// Takes the beads of a file by layers. Layers begin at tags; without them where z changes
+/// between beads.
 class LayerTrack {
  public:
-  explicit LayerTrack(bool walls_close) : walls_close_(walls_close) {}
+  struct TrackRules {
+    bool walls_close = false;
+    std::uint32_t raft_layers = 0;  // may have a gap above them
+    double nozzle_mm = 0.4;         // no layer is thicker
+  };
+  explicit LayerTrack(const TrackRules& rules) : rules_(rules) {}
 
   /// A tag that begins a layer.
   void tag(std::uint64_t line, Defects& defects);
@@ -36,9 +42,10 @@ class LayerTrack {
   struct TrackedLayer {
     std::uint32_t index = 0;
     std::uint64_t line = 0;
-    double z = 0, height = 0;
+    double z = 0, top = 0, height = 0;  // z: of the first bead; top: of the highest
     std::uint64_t beads = 0;
     bool part = false, outer = false;  // has beads other than supports; outer walls
+    bool climbs = false;               // begins with a bead that climbs
     FileLine begin() const { return {line, index}; }
   };
   void begin_layer(std::uint64_t line);
@@ -47,12 +54,12 @@ class LayerTrack {
   void compare_rise(double rise, Defects& defects);
   void compare_walls(Defects& defects);
 
-  bool walls_close_;
+  TrackRules rules_;
   bool tagged_ = false, begun_ = false;
   double stated_z_ = -1;
   TrackedLayer now_, below_;  // below: the last one with beads
   bool has_below_ = false;
-  double first_z_ = 0, top_ = 0;
+  double first_z_ = 0, top_ = 0, last_z_ = 0;
   double rise_ = 0;  // of the layer before
   // A gap without tags of heights is compared with the rise of the next layer too.
   FileLine gap_;
