@@ -389,20 +389,29 @@ Result<VerifyReport> verify_file(const std::string& path, const VerifyOptions& o
   const auto manifest = read_manifest(manifest_path);
   if (!manifest) return manifest.error();
   const fs::path folder = fs::path(path).parent_path();
-  VerifyReport report = verify_paths(path, folder.empty() ? "." : folder.string(), *manifest);
-  if (options.quick || manifest->head.format != "gcode") return report;
-  const bool as_recorded = report.ok();
+  const std::string directory = folder.empty() ? "." : folder.string();
+  VerifyReport recorded = verify_paths(path, directory, *manifest);
+  if (options.quick || manifest->head.format != "gcode") return recorded;
+  VerifyReport report;
   if (Status status = replay_file(path, options, &manifest->head, report); !status) {
+    report = std::move(recorded);
     report.add(status.error().message);
     return report;
   }
-  // Equal bytes have equal beads; a difference of bytes is located by the plan.
-  if (as_recorded && options.toolpaths.parts.empty()) return report;
-  std::vector<std::string> folders = options.toolpaths.parts;
-  folders.insert(folders.end(), {".", folder.empty() ? "." : folder.string(), folder.parent_path().string()});
-  auto plan = compare_with_plan(path, manifest->head, folders, options.toolpaths.machine, report);
-  if (!plan) return plan.error();
-  report.toolpaths->plan = std::move(*plan);
+  // Equal bytes have equal beads; the plan locates a difference of bytes.
+  if (!recorded.ok() || !options.toolpaths.parts.empty()) {
+    std::vector<std::string> folders = options.toolpaths.parts;
+    folders.insert(folders.end(), {".", directory, fs::path(directory).parent_path().string()});
+    auto plan = compare_with_plan(path, manifest->head, folders, options.toolpaths.machine, report);
+    if (!plan) return plan.error();
+    report.toolpaths->plan = std::move(*plan);
+  }
+  // Where a line is added all later layers differ from their records: those come last.
+  report.directory = recorded.directory;
+  report.layers = recorded.layers;
+  report.bytes = recorded.bytes;
+  for (std::string& fault : recorded.faults) report.add(std::move(fault));
+  report.fault_count += recorded.fault_count - recorded.faults.size();
   return report;
 }
 

@@ -69,7 +69,8 @@ TEST(GcodeReplay, LayersFollowEachOtherUpwards) {
   EXPECT_EQ(found(replay(kHeat + square(2.2) + "M104 S0\n")), "late-layer");
   EXPECT_EQ(found(replay(kHeat + square(0.2) + ";LAYER_CHANGE\n;Z:0.4\n;HEIGHT:0.2\n" + square(0.6) + "M104 S0\n")), "empty-layer");
   // Parts one after another begin again at the bed; a support layer may have a gap above it.
-  EXPECT_EQ(found(replay(kHeat + square(0.2) + square(0.4) + "G92 X100\n" + square(0.2) + square(0.4) + "M104 S0\n")), "");
+  const std::string two = square(0.2) + square(0.4);
+  EXPECT_EQ(found(replay(kHeat + two + "G0 X0 Y10\nG0 X0 Y9\n" + two + "M104 S0\n")), "");
   std::string raft = square(0.2);
   raft.replace(raft.find("External perimeter"), 18, "Support material");
   EXPECT_EQ(found(replay(kHeat + raft + square(0.6) + "M104 S0\n")), "");
@@ -124,6 +125,17 @@ TEST(GcodeReplay, BeadsAreDepositedOnce) {
   EXPECT_EQ(found(replay(kHeat + square(0.2) + square(0.2) + "M104 S0\n")), "doubled-bead");
   // Back along a line is how thin walls are filled.
   EXPECT_EQ(found(replay(kHeat + square(0.2) + "G1 X10 Y50 E1\nG1 X10 Y10 E1\nM104 S0\n")), "");
+}
+
+TEST(GcodeReplay, ATravelThroughAWallIsANoteUnlessTheFilamentIsDrawnBack) {
+  const std::string line = ";TYPE:Internal infill\n;WIDTH:0.4\n";
+  const ReplayReport report = replay(kHeat + square(0.2) + "G0 X15 Y15\nG0 X40 Y20\n" + line + "G1 X50 Y20 E0.31585\nM104 S0\n");
+  EXPECT_EQ(found(report), "wall-crossing");
+  EXPECT_EQ(report.defects[Defect::kCrossing].count, 1u);
+  EXPECT_EQ(report.defects.faults(), 0u);
+  EXPECT_EQ(found(replay(kHeat + square(0.2) + "G1 E-1\nG0 X40 Y20\nG1 E1\n" + line + "G1 X50 Y20 E0.31585\nM104 S0\n")), "");
+  EXPECT_EQ(found(replay(kHeat + square(0.2) + "G10\nG0 X40 Y20\nG11\n" + line + "G1 X50 Y20 E0.31585\nM104 S0\n")), "");
+  EXPECT_EQ(found(replay(kHeat + square(0.2) + "G0 X20 Y20\n" + line + "G1 X25 Y20 E0.15793\nM104 S0\n")), "");  // inside
 }
 
 TEST(GcodeReplay, BeadsHaveASpeed) {

@@ -24,6 +24,7 @@ class FilamentBalance {
   void forget();
   /// Reports the balances that differ from that of most pauses.
   void finish(Defects& defects) const;
+  bool drawn_back() const { return sum_ < -kToleranceMm; }
   std::uint64_t retractions() const { return retractions_; }
 
  private:

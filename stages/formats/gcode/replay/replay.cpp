@@ -15,6 +15,7 @@
 #include "stages/formats/gcode/replay/filament_balance.h"
 #include "stages/formats/gcode/replay/heaters.h"
 #include "stages/formats/gcode/replay/layer_track.h"
+#include "stages/formats/gcode/replay/wall_crossings.h"
 #include "stages/geometry/bead_section.h"
 #include "stages/support/io/file_reader.h"
 
@@ -129,6 +130,7 @@ class Replay final : public CommandObserver {
   FilamentBalance balance_;
   BeadSections sections_;
   DepositedBeads deposited_;
+  WallCrossings crossings_;
   LayerTrack::TrackRules rules_;
   LayerTrack layers_;
   PrintTime time_;
@@ -137,6 +139,8 @@ class Replay final : public CommandObserver {
   double net_ = 0, fed_ = 0;  // mm of filament of all moves, and of those that deposit
   FileLine back_;             // the first move that draws filament back along its way
   bool volumetric_ = false, homed_ = false;
+  bool retracted_ = false;       // by G10
+  std::uint64_t flat_beads_ = 0;  // since the last one that climbs
 };
 
 /// Beads of start code belong to no layer; what was found of its temperatures stays.
@@ -153,6 +157,7 @@ void Replay::begin_tagged() {
   totals.stated_filament_mm = totals_.stated_filament_mm;
   totals_ = totals;
   sections_ = BeadSections();
+  crossings_ = WallCrossings();
   layers_ = LayerTrack(rules_);
   // Of lamina's files the pause before the first bead has a balance too; others prime there.
   if (!totals_.own) balance_.forget();
@@ -180,6 +185,8 @@ void Replay::on_move(const GcodeMove& move) {
   if (planar && fed < 0 && back_.line == 0) back_ = here();
   if (planar && !deposits) {
     const double length = std::hypot(dx, dy);
+    if (!balance_.drawn_back() && !retracted_ && length > 2 * WallCrossings::kTouchMm)
+      crossings_.travel(move.from, move.to, here());
     ++totals_.travels;
     totals_.travel_mm += length;
     totals_.max_travel_mm_s = std::max(totals_.max_travel_mm_s, now.speed);
@@ -198,6 +205,8 @@ void Replay::on_command(char letter, double code, const GcodeWords& words) {
   if (letter == 'T') return balance_.forget();
   if (letter == 'G') {
     homed_ = homed_ || code == 28;
+    // RepRapFirmware's and Marlin's retraction by firmware.
+    if (code == 11 || (code == 10 && words.given == 0)) retracted_ = code == 10;
     if (code == 4) dwell_s_ += words.has('S') ? words['S'] : words['P'] / 1000;
     return;
   }
@@ -263,7 +272,11 @@ void Replay::bead(const RawBead& raw) {
   const GcodeFile::FilePosition& now = walk_.position();
   const BeadRole role_of_bead = role();
   layers_.bead(raw, role_of_bead, now.height, now.line, defects_);
-  if (std::exchange(z_, raw.to[2]) != raw.to[2]) deposited_.next_layer();
+  if (std::exchange(z_, raw.to[2]) != raw.to[2]) {
+    deposited_.next_layer();
+    crossings_.end_layer(defects_);
+  }
+  if (role_of_bead == BeadRole::kOuter) crossings_.wall(raw.from, raw.to);
   if (totals_.beads++ == 0) {
     check_first_bead();
     std::copy_n(raw.from, 3, totals_.low.begin());
@@ -288,7 +301,10 @@ void Replay::bead(const RawBead& raw) {
   totals_.bed_degc = {std::min(totals_.bed_degc[0], heaters_.bed_degc()), std::max(totals_.bed_degc[1], heaters_.bed_degc())};
   const double coldest = heaters_.min_degc(now.firmware);
   if (degc < coldest && !heaters_.unknown()) defects_.add(Defect::kCold, here(), degc, coldest);
-  check_section(mm3, length, now.height);
+  // In spirals the bead from turn to turn has the filament of another length; some beads there rise by less than a micrometre.
+  constexpr std::uint32_t kAfterClimb = 50;  // beads
+  flat_beads_ = raw.from[2] == raw.to[2] ? flat_beads_ + 1 : 0;
+  if (flat_beads_ == totals_.beads || flat_beads_ > kAfterClimb) check_section(mm3, length, now.height);
   if (options_.machine != nullptr) check_machine(raw, mm3, length);
   if (length >= BeadSections::kMinMm && deposited_.add(raw.from, raw.to))
     defects_.add(Defect::kDoubledBead, here(), length, 0);
@@ -296,6 +312,7 @@ void Replay::bead(const RawBead& raw) {
 
 void Replay::finish(ReplayReport& report) {
   layers_.finish(defects_);
+  crossings_.end_layer(defects_);
   sections_.finish(defects_);
   balance_.finish(defects_);
   // Relative numbers that are read as absolute go up and down.
