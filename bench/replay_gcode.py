@@ -30,7 +30,7 @@ PRUSA = [
     ("screw_cap_insert_threads.stl", 100, ["--raft-layers", "3", "--gcode-flavor", "marlin2"]),
     ("motor_bracket.stl.gz", 100, ["--gcode-flavor", "smoothie", "--use-relative-e-distances", "--infill-every-layers", "2"]),
     ("stanford_bunny.stl", 60, ["--spiral-vase", "--perimeters", "1", "--top-solid-layers", "0", "--fill-density", "0"]),
-    ("flexi_labrador_print_in_place.stl", 100, ["--brim-width", "5", "--gcode-flavor", "reprapfirmware"]),
+    ("flexi_labrador*.stl", 100, ["--brim-width", "5", "--gcode-flavor", "reprapfirmware"]),
     ("honeycomb_vase_1mm_wall.stl.gz", 60, ["--thin-walls", "--fill-pattern", "gyroid"]),
     ("nist_am_test_artifact_v3b.stl", 50, ["--wipe", "--retract-before-wipe", "70%", "--use-relative-e-distances", "--ironing"]),
     ("dental_crown.stl", 150, ["--complete-objects", "--duplicate", "2"]),
@@ -55,7 +55,7 @@ CURA = [
     ("screw_cap_insert_threads.stl", 100, {"adhesion_type": "raft"}),
     ("motor_bracket.stl.gz", 100, {"infill_pattern": "grid", "retraction_hop_enabled": "true", "retraction_hop": 0.5}),
     ("stanford_bunny.stl", 60, {"magic_spiralize": "true", "top_layers": 0}),
-    ("flexi_labrador_print_in_place.stl", 100, {"coasting_enable": "true"}),
+    ("flexi_labrador*.stl", 100, {"coasting_enable": "true"}),
     ("nist_am_test_artifact_v3b.stl", 50, {"adaptive_layer_height_enabled": "true", "ironing_enabled": "true"}),
 ]
 CURA_ALL = {"layer_height": 0.2, "layer_height_0": 0.2, "infill_line_distance": 4, "infill_sparse_density": 20, "infill_pattern": "lines",
@@ -71,7 +71,7 @@ EXPLAINED = {}
 
 
 def part_file(models, name, work):
-    source = os.path.join(models, name)
+    source = glob.glob(os.path.join(models, name))[0]
     if not name.endswith(".gz"):
         return source
     plain = os.path.join(work, name[:-3])

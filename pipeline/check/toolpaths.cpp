@@ -6,6 +6,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"
+#include "stages/formats/gcode/replay/defect_text.h"
 #include "stages/formats/gcode/write_gcode.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

@@ -7,18 +7,13 @@
 #include <vector>
 
 #include "pipeline/check/planned_beads.h"
+#include "pipeline/check/verify.h"
 #include "pipeline/report/summary.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
 #include "stages/formats/gcode/replay/replay.h"
 
 namespace lamina::pipeline {
-
-struct ToolpathOptions {
-  std::string machine, material;  // of `lamina extrude`; empty: the recorded ones, or no rules of a machine
-  std::vector<std::string> parts;  // folders or files of the parts of a file of lamina
-  double filament_mm = 0;         // diameter; 0: the file's
-};
 
 /// What a replay of a file found.
 struct ToolpathCheck {

@@ -14,6 +14,7 @@
 
 #include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
+#include "pipeline/check/toolpaths.h"
 #include "pipeline/manifest/compare.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
@@ -355,7 +356,7 @@ VerifyReport verify_paths(const std::string& name, const std::string& directory,
 Status replay_file(const std::string& path, const VerifyOptions& options, const ManifestHead* head, VerifyReport& report) {
   auto check = check_toolpaths(path, options.toolpaths, head, report);
   if (!check) return check.error();
-  report.toolpaths = std::move(*check);
+  report.toolpaths = std::make_shared<ToolpathCheck>(std::move(*check));
   return {};
 }
 
@@ -379,7 +380,8 @@ Result<VerifyReport> verify_file(const std::string& path, const VerifyOptions& o
   std::error_code error;
   if (!fs::is_regular_file(manifest_path, error)) {
     const bool begun = fs::is_regular_file(manifest_path + ".part", error);
-    if (!begun && !options.quick && fs::path(path).extension() != ".sml") return verify_third_party(path, options);
+    const bool alone = !begun && !fs::exists(fs::symlink_status(manifest_path, error));
+    if (alone && !options.quick && fs::path(path).extension() != ".sml") return verify_third_party(path, options);
     return Error{Fault::kVerification,
                  fmt::format("{}: {}", path,
                              begun ? "job was interrupted; run again with --resume"

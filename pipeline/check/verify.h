@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "pipeline/check/toolpaths.h"
 #include "pipeline/report/summary.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
@@ -14,10 +13,19 @@
 
 namespace lamina::pipeline {
 
+struct ToolpathCheck;  // pipeline/check/toolpaths.h
+
+/// Of G-code files.
+struct ToolpathOptions {
+  std::string machine, material;   // of `lamina extrude`; empty: the recorded ones, or no rules of a machine
+  std::vector<std::string> parts;  // folders or files of the parts of a file of lamina
+  double filament_mm = 0;          // diameter; 0: the file's
+};
+
 struct VerifyOptions {
   bool quick = false;  // sizes and hashes only; images are not decoded
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // of layers in flight
-  ToolpathOptions toolpaths;                            // of G-code files
+  ToolpathOptions toolpaths;
 };
 
 /// Faults are in layer order, then stray files, then missing shards.
@@ -32,8 +40,8 @@ struct VerifyReport : Faults {
   std::vector<UnfedPowder> unfed;     // by material, of a job with several and a machine
   replay::Material material;          // used up
   double coverage = 0;                // drops / pixels of the replayed layers
-  std::optional<ToolpathCheck> toolpaths;  // of a replayed G-code file
-  bool recorded = true;                    // compared with a manifest
+  std::shared_ptr<ToolpathCheck> toolpaths;  // of a replayed G-code file; else null
+  bool recorded = true;                      // compared with a manifest
   Summary use;                        // what they use up and cost: lines, facts, table; empty without programs
 };
 

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "stages/formats/gcode/replay/defect_text.h"
 #include "stages/formats/gcode/replay/replay.h"
 #include "tests/commands/program.h"
 

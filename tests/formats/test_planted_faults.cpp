@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "stages/formats/gcode/replay/defect_text.h"
 #include "stages/formats/gcode/replay/replay.h"
 #include "tests/commands/program.h"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "pipeline/check/toolpaths.h"
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"

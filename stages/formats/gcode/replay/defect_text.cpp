@@ -1,8 +1,6 @@
+#include "stages/formats/gcode/replay/defect_text.h"
+
 #include <fmt/format.h>
-
-#include <string_view>
-
-#include "stages/formats/gcode/replay/replay.h"
 
 namespace lamina::formats::gcode {
 namespace {

@@ -51,9 +51,4 @@ struct ReplayReport {
 /// cost    O(bytes); memory of the largest layer, 32 bytes a bead
 Result<ReplayReport> replay_gcode(const std::string& path, const ReplayOptions& options);
 
-/// One line on a kind of defects: "line 1234: a bead at 150 degC, below the 170 degC at which firmwares feed (layer 12; 7 in all)".
-std::string defect_text(Defect kind, const DefectCount& of);
-/// A short name: "cold-extrusion".
-std::string_view defect_name(Defect kind);
-
 }  // namespace lamina::formats::gcode
