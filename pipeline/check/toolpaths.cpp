@@ -62,6 +62,11 @@ Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOpt
       faults.add(defect_text(kind, of));
     }
   }
+  if (!options.model.empty()) {
+    auto model = compare_with_model(path, options.model, options.filament_mm, faults);
+    if (!model) return model.error();
+    check.model = std::move(*model);
+  }
   return check;
 }
 
@@ -87,6 +92,14 @@ Summary::Lines ToolpathCheck::lines() const {
     line("plan", plan->reason.empty() ? fmt::format("{} beads planned again; {} missing, {} not planned, {} changed",
                                                     readable_count(plan->planned), plan->missing, plan->added, plan->changed)
                                       : "not compared: " + plan->reason);
+  }
+  if (model && !model->reason.empty()) line("model", "not compared: " + model->reason);
+  if (model && model->reason.empty()) {
+    line("model", fmt::format("{} layers; {:.2f} cm3 of beads in {:.2f} cm3, {:.1f} % on average, {:.1f} % (layer {}) to {:.1f} % "
+                              "(layer {}); outer walls along {:.0f} % of the outline or more (layer {})",
+                              model->layers, model->bead_mm3 / 1000, model->model_mm3 / 1000, 100 * model->mean_fill(),
+                              100 * model->min_fill.value, model->min_fill.layer, 100 * model->max_fill.value, model->max_fill.layer,
+                              100 * model->min_outline.value, model->min_outline.layer));
   }
   for (std::size_t k = 0; k < kDefects; ++k) {
     const auto kind = static_cast<Defect>(k);
@@ -135,6 +148,14 @@ Json ToolpathCheck::json() const {
   for (const double at : t.low) json["low_mm"].push_back(at);
   for (const double at : t.high) json["high_mm"].push_back(at);
   if (!machine.empty()) json["machine"] = machine;
+  if (model) {
+    json["model"] = {{"compared", model->reason.empty()},   {"reason", model->reason},
+                     {"layers", model->layers},             {"model_mm3", model->model_mm3},
+                     {"bead_mm3", model->bead_mm3},         {"mean_fill", model->mean_fill()},
+                     {"min_fill", model->min_fill.value},   {"min_fill_layer", model->min_fill.layer},
+                     {"max_fill", model->max_fill.value},   {"max_fill_layer", model->max_fill.layer},
+                     {"min_outline", model->min_outline.value}, {"min_outline_layer", model->min_outline.layer}};
+  }
   if (plan) {
     json["plan"] = {{"compared", plan->reason.empty()}, {"beads", plan->planned},   {"missing", plan->missing},
                     {"added", plan->added},             {"changed", plan->changed}, {"reason", plan->reason}};

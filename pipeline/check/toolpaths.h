@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/check/model_layers.h"
 #include "pipeline/check/planned_beads.h"
 #include "pipeline/check/verify.h"
 #include "pipeline/report/summary.h"
@@ -20,6 +21,7 @@ struct ToolpathCheck {
   formats::gcode::ReplayReport replay;
   std::string machine;  // whose limits were compared; empty: none
   std::optional<PlanComparison> plan;
+  std::optional<ModelComparison> model;
 
   /// Lines for people: sums, then a line for each kind of note.
   Summary::Lines lines() const;

@@ -19,6 +19,7 @@ struct ToolpathCheck;  // pipeline/check/toolpaths.h
 struct ToolpathOptions {
   std::string machine, material;   // of `lamina extrude`; empty: the recorded ones, or no rules of a machine
   std::vector<std::string> parts;  // folders or files of the parts of a file of lamina
+  std::string model;               // the part of a file of any slicer; empty: not compared
   double filament_mm = 0;          // diameter; 0: the file's
 };
 

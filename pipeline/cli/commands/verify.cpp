@@ -30,7 +30,8 @@ CommandSpec verify_spec() {
                   {"--machine", "NAME|FILE", "extrusion printer whose limits G-code must keep", "", ""},
                   {"--material", "NAME|FILE", "its material, with a melt rate", "", ""},
                   {"--filament", "MM", "filament diameter; default: as the file states, else 1.75", "", ""},
-                  {"--parts", "DIR", "folder or file of the parts, to compare G-code of lamina with its plan; repeatable", "", ""},
+                  {"--model", "FILE", "part of a G-code file: volumes and outlines by layer", "", ""},
+                  {"--parts", "DIR", "folder or file of parts, to plan the job again; repeatable", "", ""},
                   {"--quick", "", "check sizes and hashes only, without images or a replay", "", ""},
                   {"--memory", "SIZE", "memory limit for layers in flight: 256M, 1G", "1G", ""},
                   {"--json", "", "print one JSON object per directory on stdout", "", ""},
@@ -80,6 +81,7 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
   options.quick = arguments.has("--quick");
   if (Status status = arguments.read("--memory", read_bytes, options.memory_bytes); !status) return status;
   options.toolpaths.machine = arguments.text("--machine");
+  options.toolpaths.model = arguments.text("--model");
   options.toolpaths.parts = arguments.all("--parts");
   options.toolpaths.material = arguments.text("--material");
   std::string (*const read_diameter)(std::string_view, double&) = [](std::string_view text, double& mm) {
