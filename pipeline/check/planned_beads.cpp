@@ -91,7 +91,7 @@ void BeadComparison::report(std::uint32_t index, const BeadDifference& differenc
   if (difference.count == 0) return;
   const auto& types = plan_.types();
   const std::string type = difference.first.type < types.size() ? types[difference.first.type] : "another type";
-  faults_.add(fmt::format("layer {}: {} {}, {:.3f} mm long; the first of {} at ({:.3f}, {:.3f}) mm", index, difference.count, what,
+  faults_.add(fmt::format("layer {}: {}: {}, {:.3f} mm; the first, {}, at ({:.3f}, {:.3f}) mm", index, what, difference.count,
                           difference.length_mm, type, static_cast<double>(difference.first.from_x) / 1000,
                           static_cast<double>(difference.first.from_y) / 1000));
 }
@@ -118,9 +118,9 @@ void BeadComparison::compare_layer(std::uint32_t index, const GcodeLayer& found,
       ++f, ++p;
     }
   }
-  report(index, missing, "planned beads are missing");
-  report(index, added, "beads are not planned");
-  report(index, changed, "beads have another width or volume");
+  report(index, missing, "missing beads");
+  report(index, added, "beads that are not planned");
+  report(index, changed, "beads of another width or volume");
   if (!same_order && missing.count + added.count == 0)
     faults_.add(fmt::format("layer {}: its beads are deposited in another order than planned", index));
   result_.missing += missing.count;

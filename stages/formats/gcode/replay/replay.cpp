@@ -358,6 +358,7 @@ Result<ReplayReport> replay_gcode(const std::string& path, const ReplayOptions& 
   const HeadFacts facts = read_facts(*reader);
   auto replay = std::make_unique<Replay>(*reader, options, facts);
   ReplayReport report = replay->run();
+  if (report.totals.beads == 0 && !report.unreadable.empty()) return Error{Fault::kUsage, report.unreadable};
   if (report.totals.beads == 0 && report.defects.faults() == 0)
     return Error{Fault::kUsage, path + ": no move extrudes filament; give a G-code file of an extrusion printer"};
   return report;
