@@ -132,7 +132,7 @@ Json ToolpathCheck::json() const {
                {"retractions", t.retractions},
                {"filament_mm", t.filament_mm},
                {"volume_mm3", t.mm3},
-               {"grams", t.grams},
+               {"filament_g", t.grams},
                {"seconds", t.seconds},
                {"stated_seconds", t.stated_seconds},
                {"max_bead_mm_s", t.max_bead_mm_s},

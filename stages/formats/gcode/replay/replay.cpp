@@ -193,7 +193,8 @@ void Replay::on_move(const GcodeMove& move) {
     if (options_.machine != nullptr && now.speed > kFastShare * machine_.speed.travel_mm_s && length > 1)
       defects_.add(Defect::kTooFast, here(), now.speed, machine_.speed.travel_mm_s);
   }
-  if (now.speed <= 0) return;
+  constexpr double kFarthestMm = 1e5;  // no printer moves that far
+  if (now.speed <= 0 || !(std::hypot(dx, dy, dz) + std::abs(fed) <= kFarthestMm)) return;
   const double commanded = !deposits && travel_acceleration_ > 0 ? travel_acceleration_ : now.acceleration;
   time_.set_limits(commanded > 0 ? commanded : machine_.speed.acceleration_mm_s2, time_.corner_mm_s());
   time_.move({dx, dy, dz, fed}, now.speed);
@@ -322,7 +323,9 @@ void Replay::finish(ReplayReport& report) {
   totals_.layers = layers_.count();
   totals_.lines = walk_.position().line;
   totals_.retractions = balance_.retractions();
-  totals_.seconds = time_.halt() + dwell_s_;
+  constexpr double kLongest = 1e9;  // seconds; speeds may be any number
+  totals_.seconds = std::clamp(time_.halt() + dwell_s_, 0.0, kLongest);
+  totals_.stated_seconds = std::clamp(totals_.stated_seconds, 0.0, kLongest);
   totals_.diameter_mm = machine_.material.filament_mm;
   totals_.mm3 = totals_.filament_mm * filament_mm2_;
   totals_.grams = totals_.mm3 / 1000 * machine_.material.density_g_cm3;

@@ -27,12 +27,32 @@ void WallCrossings::wall(const double* from, const double* to) {
 }
 
 void WallCrossings::travel(const double* from, const double* to, FileLine at) {
+  constexpr double kFarthestMm = 2000;
+  for (const double* end : {from, to}) {
+    if (!(std::abs(end[0]) <= kFarthestMm && std::abs(end[1]) <= kFarthestMm)) return;
+  }
   travels_.push_back({{from[0], from[1], to[0], to[1]}, at});
 }
 
 std::uint32_t WallCrossings::cell_of(double at, std::size_t axis) const {
   const double cell = std::floor((at - low_[axis]) / step_);
   return static_cast<std::uint32_t>(std::clamp(cell, 0.0, cells_[axis] - 1.0));
+}
+
+template <class Visit>
+bool WallCrossings::each_row(const std::array<double, 4>& ends, Visit visit) const {
+  auto [x0, y0, x1, y1] = ends;
+  if (y0 > y1) std::swap(x0, x1), std::swap(y0, y1);
+  const double slope = y1 > y0 ? (x1 - x0) / (y1 - y0) : 0;
+  const std::uint32_t end = cell_of(y1, 1);
+  for (std::uint32_t row = cell_of(y0, 1); row <= end; ++row) {
+    const double bottom = low_[1] + row * step_, top = bottom + step_;
+    const double a = y1 > y0 ? x0 + slope * (std::clamp(bottom, y0, y1) - y0) : x0;
+    const double b = y1 > y0 ? x0 + slope * (std::clamp(top, y0, y1) - y0) : x1;
+    const std::size_t begin = std::size_t{row} * cells_[0];
+    if (visit(begin + cell_of(std::min(a, b), 0), begin + cell_of(std::max(a, b), 0))) return true;
+  }
+  return false;
 }
 
 /// Counting sort of the walls by the cells of their boxes.
@@ -51,11 +71,10 @@ void WallCrossings::sort_walls() {
   for (std::size_t k = 0; k < 2; ++k) cells_[k] = static_cast<std::uint32_t>((high_[k] - low_[k]) / step_) + 1;
   offset_.assign(std::size_t{cells_[0]} * cells_[1] + 1, 0);
   const auto each_cell = [&](const WallSegment& wall, auto visit) {
-    const auto [x0, x1] = std::minmax(wall.ends[0], wall.ends[2]);
-    const auto [y0, y1] = std::minmax(wall.ends[1], wall.ends[3]);
-    for (std::uint32_t y = cell_of(y0, 1); y <= cell_of(y1, 1); ++y) {
-      for (std::uint32_t x = cell_of(x0, 0); x <= cell_of(x1, 0); ++x) visit(std::size_t{y} * cells_[0] + x);
-    }
+    each_row({wall.ends[0], wall.ends[1], wall.ends[2], wall.ends[3]}, [&](std::size_t first, std::size_t last) {
+      for (std::size_t cell = first; cell <= last; ++cell) visit(cell);
+      return false;
+    });
   };
   for (const WallSegment& wall : walls_) each_cell(wall, [&](std::size_t cell) { ++offset_[cell + 1]; });
   for (std::size_t i = 1; i < offset_.size(); ++i) offset_[i] += offset_[i - 1];
@@ -66,28 +85,16 @@ void WallCrossings::sort_walls() {
   offset_[0] = 0;
 }
 
-bool WallCrossings::meets_cells(const OpenTravel& travel, std::uint32_t row, std::uint32_t first, std::uint32_t last) const {
-  const std::size_t begin = std::size_t{row} * cells_[0];
-  for (std::uint32_t i = offset_[begin + first]; i < offset_[begin + last + 1]; ++i) {
-    if (cuts(travel.ends, walls_[cell_walls_[i]].ends, kTouchMm)) return true;
-  }
-  return false;
-}
-
-/// Row by row of the grid, the cells that the travel passes.
 bool WallCrossings::crosses(const OpenTravel& travel) const {
-  auto [x0, y0, x1, y1] = travel.ends;
-  if (y0 > y1) std::swap(x0, x1), std::swap(y0, y1);
-  if (y1 < low_[1] || y0 > high_[1] || std::max(x0, x1) < low_[0] || std::min(x0, x1) > high_[0]) return false;
-  const double slope = y1 > y0 ? (x1 - x0) / (y1 - y0) : 0;
-  const std::uint32_t end = cell_of(y1, 1);
-  for (std::uint32_t row = cell_of(y0, 1); row <= end; ++row) {
-    const double bottom = low_[1] + row * step_, top = bottom + step_;
-    const double a = y1 > y0 ? x0 + slope * (std::clamp(bottom, y0, y1) - y0) : x0;
-    const double b = y1 > y0 ? x0 + slope * (std::clamp(top, y0, y1) - y0) : x1;
-    if (meets_cells(travel, row, cell_of(std::min(a, b), 0), cell_of(std::max(a, b), 0))) return true;
-  }
-  return false;
+  const auto& [x0, y0, x1, y1] = travel.ends;
+  if (std::max(y0, y1) < low_[1] || std::min(y0, y1) > high_[1] || std::max(x0, x1) < low_[0] || std::min(x0, x1) > high_[0])
+    return false;
+  return each_row(travel.ends, [&](std::size_t first, std::size_t last) {
+    for (std::uint32_t i = offset_[first]; i < offset_[last + 1]; ++i) {
+      if (cuts(travel.ends, walls_[cell_walls_[i]].ends, kTouchMm)) return true;
+    }
+    return false;
+  });
 }
 
 void WallCrossings::end_layer(Defects& defects) {

@@ -18,6 +18,7 @@ class WallCrossings {
   static constexpr double kTouchMm = 0.2;  // from the ends of a travel
 
   void wall(const double* from, const double* to);
+  /// Positions that no bed has are left out.
   void travel(const double* from, const double* to, FileLine at);
   /// Counts, and begins the next layer. cost  O(walls + cells of the travels)
   void end_layer(Defects& defects);
@@ -32,7 +33,9 @@ class WallCrossings {
   };
   void sort_walls();
   bool crosses(const OpenTravel& travel) const;
-  bool meets_cells(const OpenTravel& travel, std::uint32_t row, std::uint32_t first, std::uint32_t last) const;
+  /// Calls visit(first, last), the cells that a segment within the grid passes, row by row, until it returns true. returns  whether it did
+  template <class Visit>
+  bool each_row(const std::array<double, 4>& ends, Visit visit) const;
   std::uint32_t cell_of(double at, std::size_t axis) const;
 
   std::vector<WallSegment> walls_;
