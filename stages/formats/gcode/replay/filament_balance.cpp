@@ -25,21 +25,15 @@ void FilamentBalance::forget() {
   step_ = {};
 }
 
-void FilamentBalance::bead(FileLine at, Defects& defects) {
+void FilamentBalance::bead(FileLine at) {
   if (!open_) return;
-  constexpr double kExact = 0.02, kBin = 0.02;  // mm
-  const double balance = sum_, deepest = deepest_;
-  const BackStep step = step_;
+  constexpr double kBin = 0.02;  // mm
+  const PauseBalance now{sum_, deepest_, 0, sum_ > 0 ? fed_at_ : at, step_};
+  const double balance = sum_;
   const bool exempt = exempt_;
   forget();
   exempt_ = false;
   if (exempt) return;
-  if (std::abs(balance) <= kExact) usual_ = std::max(usual_, deepest);
-  // An E that goes back by more than retractions do was counted from 0 without G92 E0.
-  if (step.absolute && -balance > 1.05 * usual_ + kToleranceMm) {
-    defects.add(Defect::kLostReset, step.at, -balance, usual_);
-    return;
-  }
   const auto same = [&](const PauseBalance& of) { return std::abs(of.mm - balance) <= kBin; };
   auto* found = std::find_if(balances_.data(), balances_.data() + size_, same);
   if (found == balances_.data() + size_) {
@@ -48,11 +42,12 @@ void FilamentBalance::bead(FileLine at, Defects& defects) {
         return std::abs(a.mm - balance) < std::abs(b.mm - balance);
       });
     } else {
-      *found = {balance, 0, balance > 0 ? fed_at_ : at};
+      *found = now;
       ++size_;
     }
   }
   ++found->count;
+  found->deepest = std::max(found->deepest, now.deepest);
 }
 
 void FilamentBalance::finish(Defects& defects) const {
@@ -63,7 +58,12 @@ void FilamentBalance::finish(Defects& defects) const {
   for (const auto* one = balances_.data(); one != end; ++one) {
     const double more = one->mm - usual->mm;
     if (std::abs(more) <= kToleranceMm) continue;
-    defects.add(more > 0 ? Defect::kOverfed : Defect::kNotFedBack, one->first, std::abs(more), usual->mm, one->count);
+    // An E that goes back by more than retractions do was counted from 0 without G92 E0.
+    if (one->last_back.absolute && -one->mm > 1.05 * usual->deepest + kToleranceMm) {
+      defects.add(Defect::kLostReset, one->last_back.at, -one->mm, usual->deepest, one->count);
+    } else {
+      defects.add(more > 0 ? Defect::kOverfed : Defect::kNotFedBack, one->first, std::abs(more), usual->mm, one->count);
+    }
   }
 }
 

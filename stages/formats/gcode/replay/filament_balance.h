@@ -18,8 +18,8 @@ class FilamentBalance {
 
   /// Filament that deposits nothing; mm, below 0: drawn back.
   void feed(double mm, bool absolute, FileLine at);
-  /// A bead. returns  nothing, or a finding of its start
-  void bead(FileLine at, Defects& defects);
+  /// A bead.
+  void bead(FileLine at);
   /// After a change of tool, a pause or start code: the next bead is not compared.
   void forget();
   /// Reports the balances that differ from that of most pauses.
@@ -28,22 +28,22 @@ class FilamentBalance {
   std::uint64_t retractions() const { return retractions_; }
 
  private:
-  struct PauseBalance {
-    double mm = 0;
-    std::uint64_t count = 0;
-    FileLine first;
-  };
   struct BackStep {
     double mm = 0;
     FileLine at;
-    bool absolute = false;
+    bool absolute = false;  // E
+  };
+  struct PauseBalance {
+    double mm = 0, deepest = 0;  // the sum; the farthest that was drawn back
+    std::uint64_t count = 0;
+    FileLine first;
+    BackStep last_back;  // of the first
   };
   static constexpr std::size_t kBalances = 64;
 
   std::array<PauseBalance, kBalances> balances_{};
   std::size_t size_ = 0;
   double sum_ = 0, deepest_ = 0;  // since the last bead, mm
-  double usual_ = 0;              // the deepest retraction that was fed again, mm
   FileLine fed_at_;               // the last one that fed
   BackStep step_;                 // the last one since the last bead
   bool open_ = false, exempt_ = false;

@@ -173,18 +173,18 @@ void Replay::on_move(const GcodeMove& move) {
   const bool deposits = planar && fed > 0;
   if (now.speed <= 0 && (deposits || move.states_feed_rate)) defects_.add(Defect::kNoFeedRate, here(), 0, 0);
   if (deposits) {
-    balance_.bead(here(), defects_);
+    balance_.bead(here());
   } else {
     if (fed != 0) balance_.feed(fed, !now.relative_feed && !now.relative, here());
     // Moves of a rounded micrometre deposit nothing and interrupt nothing.
-    if (std::hypot(dx, dy, dz) > 10 * kRounding) layers_.end_path(defects_);
+    if (dx * dx + dy * dy + dz * dz > 100 * kRounding * kRounding) layers_.end_path(defects_);
   }
   if (!in_layers()) return;
   net_ += fed;
   if (deposits) fed_ += fed;
   if (planar && fed < 0 && back_.line == 0) back_ = here();
   if (planar && !deposits) {
-    const double length = std::hypot(dx, dy);
+    const double length = std::sqrt(dx * dx + dy * dy);
     if (!balance_.drawn_back() && !retracted_ && length > 2 * WallCrossings::kTouchMm)
       crossings_.travel(move.from, move.to, here());
     ++totals_.travels;
@@ -194,7 +194,7 @@ void Replay::on_move(const GcodeMove& move) {
       defects_.add(Defect::kTooFast, here(), now.speed, machine_.speed.travel_mm_s);
   }
   constexpr double kFarthestMm = 1e5;  // no printer moves that far
-  if (now.speed <= 0 || !(std::hypot(dx, dy, dz) + std::abs(fed) <= kFarthestMm)) return;
+  if (now.speed <= 0 || !(std::abs(dx) + std::abs(dy) + std::abs(dz) + std::abs(fed) <= kFarthestMm)) return;
   const double commanded = !deposits && travel_acceleration_ > 0 ? travel_acceleration_ : now.acceleration;
   time_.set_limits(commanded > 0 ? commanded : machine_.speed.acceleration_mm_s2, time_.corner_mm_s());
   time_.move({dx, dy, dz, fed}, now.speed);
