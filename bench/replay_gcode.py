@@ -107,17 +107,17 @@ def scaled(part, percent, work):
 
 
 def make(options, work):
-    """Makes the files that are not there. returns (slicer, settings, path) of each."""
+    """Makes the files that are not there. returns (slicer, settings, path, part) of each."""
     definitions = heights.cura_definitions(options.cache)
     made = []
     for slicer, jobs in (("prusa", PRUSA), ("slic3r", SLIC3R), ("cura", CURA)):
         for number, (name, percent, settings) in enumerate(jobs):
             out = os.path.join(work, f"{slicer}_{number + 1:02}.gcode")
             words = settings if isinstance(settings, list) else [f"{k}={v}" for k, v in settings.items()]
-            made.append((slicer, f"{name} {percent} %, " + " ".join(words), out))
+            part = scaled(part_file(options.models, name, work), percent, work)
+            made.append((slicer, f"{name} {percent} %, " + " ".join(words), out, part))
             if os.path.exists(out):
                 continue
-            part = scaled(part_file(options.models, name, work), percent, work)
             if slicer == "prusa":
                 call = ["prusa-slicer", "--export-gcode", part, "--nozzle-diameter", "0.4", "--bed-shape", "0x0,220x0,220x220,0x220",
                         "--center", "110,110", *settings, "-o", out]
@@ -137,7 +137,14 @@ def make(options, work):
     return made
 
 
-def verify(lamina, path):
+def verify(lamina, path, part=None):
+    """The replay, and where a part is given its comparison with the layers, which is not timed."""
+    model = {}
+    if part:
+        compared = subprocess.run([lamina, "verify", "--json", "--quiet", "--model", part, path], capture_output=True, text=True)
+        if compared.stdout.strip():
+            answer = json.loads(compared.stdout)
+            model = answer["toolpaths"]["model"] | {"faults": [fault for fault in answer["faults"] if "outline" in fault]}
     started = time.monotonic()
     done = subprocess.run([lamina, "verify", "--json", "--quiet", path], capture_output=True, text=True)
     seconds = time.monotonic() - started
@@ -145,8 +152,17 @@ def verify(lamina, path):
         return {"error": done.stderr.strip(), "seconds": seconds}
     answer = json.loads(done.stdout)["toolpaths"]
     answer["run"] = seconds
+    answer["model"] = model
     answer["bytes"] = os.path.getsize(path)
     return answer
+
+
+def model_text(model):
+    if not model:
+        return "-"
+    if not model["compared"]:
+        return "not compared: " + model["reason"]
+    return f"{100 * model['mean_fill']:.1f} %, outline from {100 * model['min_outline']:.0f} %"
 
 
 def write_page(rows):
@@ -154,11 +170,12 @@ def write_page(rows):
     lines = ["# Replays of other slicers' files", "",
              f"Written by `bench/replay_gcode.py` at commit {commit}; edits are lost. {len(rows)} files of PrusaSlicer 2.5, Slic3r 1.3, CuraEngine "
              "4.13 and `../shared/corpus/gcode`. Whole processes of `lamina verify`.", "",
-             "| file | part and settings | MB | layers | beads | s | faults | notes |", "|---|---|---|---|---|---|---|---|"]
+             "| file | part and settings | MB | layers | beads | s | faults | notes | beads in the model |",
+             "|---|---|---|---|---|---|---|---|---|"]
     for name, settings, answer, defects, notes in rows:
         kinds = [", ".join(f"{d['kind']} {d['count']} (line {d['line']})" for d in some) or "-" for some in (defects, notes)]
         lines.append(f"| {name} | {settings} | {answer['bytes'] / 1e6:.1f} | {answer['layers']} | {answer['beads']} | {answer['run']:.2f} | "
-                     f"{kinds[0]} | {kinds[1]} |")
+                     f"{kinds[0]} | {kinds[1]} | {model_text(answer['model'])} |")
     lines += ["", "## Each fault, checked", ""]
     found = [(row[0], d) for row in rows for d in row[3]]
     lines += [f"- {name}, {d['kind']} at line {d['line']}: {EXPLAINED.get((name, d['kind']), 'not explained')}" for name, d in found]
@@ -179,12 +196,12 @@ def main():
     work = os.path.join(options.cache, "replay_gcode")
     os.makedirs(work, exist_ok=True)
     files = make(options, work)
-    files += [("corpus", os.path.basename(path), path) for path in sorted(glob.glob(os.path.join(options.corpus, "*.gcode")))]
+    files += [("corpus", os.path.basename(path), path, None) for path in sorted(glob.glob(os.path.join(options.corpus, "*.gcode")))]
     rows, reports = [], []
-    for slicer, settings, path in files:
+    for slicer, settings, path, part in files:
         if not os.path.exists(path):
             continue
-        answer = verify(options.lamina, path)
+        answer = verify(options.lamina, path, part)
         name = os.path.basename(path)
         if "error" in answer:
             reports.append((name, settings, "error", answer["error"]))
@@ -194,11 +211,14 @@ def main():
         notes = [d for d in answer["defects"] if not d["fault"]]
         rows.append((name, settings, answer, defects, notes))
         print(f"{name} [{settings}]: {answer['layers']} layers, {answer['beads']} beads, {answer['run']:.2f} s")
+        if answer["model"]:
+            print("    model", model_text(answer["model"]), *answer["model"]["faults"])
         for one in defects + notes:
             text = f"{one['kind']}, {one['count']}, line {one['line']}, layer {one['layer']}, value {one['value']:g}, limit {one['limit']:g}"
             print("   ", "FAULT" if one["fault"] else "note", text)
     print(f"{len(rows)} files, {sum(len(row[3]) for row in rows)} kinds of faults")
     unexplained = [(row[0], d["kind"]) for row in rows for d in row[3] if (row[0], d["kind"]) not in EXPLAINED]
+    unexplained += [(row[0], fault) for row in rows for fault in row[2]["model"].get("faults", []) if (row[0], "model") not in EXPLAINED]
     for name, kind in unexplained:
         print(f"not explained: {name}: {kind}")
     if options.write:

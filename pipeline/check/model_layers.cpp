@@ -211,10 +211,11 @@ void LayerComparison::add_layer(const PrintedLayer& layer, double volume, const 
 
 /// A missing wall is a sudden loss; details thinner than a bead are missing in many layers.
 void LayerComparison::report_outlines() {
-  constexpr double kLoss = 0.85;  // of the share of both neighbours
+  constexpr double kLoss = 0.85;    // of the share of both neighbours
+  constexpr double kPrinted = 0.5;  // their share, at least
   for (std::size_t i = 1; i + 1 < outlines_.size(); ++i) {
     const double around = std::min(outlines_[i - 1], outlines_[i + 1]);
-    if (outlines_[i] < 0 || around < 0 || outlines_[i] >= kLoss * around) continue;
+    if (outlines_[i] < 0 || around < kPrinted || outlines_[i] >= kLoss * around) continue;
     faults_.add(fmt::format("layer {}: {:.0f} % of the model's outline have an outer wall, {:.0f} % or more in the layers around it",
                             layers_[i].first, 100 * outlines_[i], 100 * around));
   }

@@ -62,7 +62,10 @@ Result<ToolpathCheck> check_toolpaths(const std::string& path, const ToolpathOpt
       faults.add(defect_text(kind, of));
     }
   }
-  if (!options.model.empty()) {
+  if (!options.model.empty() && 4 * check.replay.totals.climbing > check.replay.totals.beads) {
+    check.model.emplace();
+    check.model->reason = "beads climb in a spiral, which has no layers";
+  } else if (!options.model.empty()) {
     auto model = compare_with_model(path, options.model, options.filament_mm, faults);
     if (!model) return model.error();
     check.model = std::move(*model);

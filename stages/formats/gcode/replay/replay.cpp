@@ -305,6 +305,7 @@ void Replay::bead(const RawBead& raw) {
   // In spirals the bead from turn to turn has the filament of another length; some beads there rise by less than a micrometre.
   constexpr std::uint32_t kAfterClimb = 50;  // beads
   flat_beads_ = raw.from[2] == raw.to[2] ? flat_beads_ + 1 : 0;
+  if (flat_beads_ == 0) ++totals_.climbing;
   if (flat_beads_ == totals_.beads || flat_beads_ > kAfterClimb) check_section(mm3, length, now.height);
   if (options_.machine != nullptr) check_machine(raw, mm3, length);
   if (length >= BeadSections::kMinMm && deposited_.add(raw.from, raw.to))

@@ -24,8 +24,8 @@ struct ReplayOptions {
 /// Sums over the layers; start code is not in them, where tags show where it ends.
 struct ReplayTotals {
   std::uint32_t layers = 0;
-  std::uint64_t beads = 0, travels = 0, retractions = 0, lines = 0;
-  double bead_mm = 0, travel_mm = 0;
+  std::uint64_t beads = 0, climbing = 0, travels = 0, retractions = 0, lines = 0;
+  double bead_mm = 0, travel_mm = 0;  // climbing: beads, of spirals
   double filament_mm = 0, mm3 = 0, grams = 0;  // net, of beads; filament_mm of the diameter below
   double diameter_mm = 1.75;
   double seconds = 0;                                       // by acceleration and corner speed (print_time.h)
