@@ -75,6 +75,7 @@ TEST(GcodeReplay, LayersFollowEachOtherUpwards) {
   std::string raft = square(0.2);
   raft.replace(raft.find("External perimeter"), 18, "Support material");
   EXPECT_EQ(found(replay(kHeat + raft + square(0.6) + "M104 S0\n")), "");
+  EXPECT_EQ(found(replay(kHeat + raft + ";LAYER_CHANGE\n;Z:0.4\n;HEIGHT:0.2\n" + square(0.6) + "M104 S0\n")), "");
 }
 
 TEST(GcodeReplay, WithoutTagsAGapIsComparedWithTheLayersAroundIt) {

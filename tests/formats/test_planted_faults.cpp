@@ -119,6 +119,7 @@ class PlantedFaults : public ::testing::Test {
     static Extruder machine;
     machine.max_nozzle_degc = 260;
     machine.max_bed_degc = 100;
+    machine.name = "Marlin";
     machine.material.max_melt_mm3_s = 8;
     machine.speed = {.print_mm_s = 60, .travel_mm_s = 150};
     test::write_text(folder_->path() / "planted.gcode", text);
@@ -397,6 +398,24 @@ const std::vector<Planted>& path_faults() {
        [](Planting& p) {
          for (std::string& line : p.lines) line = line.substr(0, std::min(line.find(" F"), line.size()));
          return p.next_bead(0) + 1;
+       }},
+      {"a file that is cut off", false, Defect::kTruncated,
+       [](Planting& p) {
+         p.erase(p.bead(8, 3), p.lines.size());
+         return p.lines.size();
+       }},
+      {"missing path of the filling", false, Defect::kStatedFilament,
+       [](Planting& p) {
+         std::size_t at = p.next_bead(p.in(6, ";TYPE:Internal infill"));
+         while (Planting::is_bead(p.lines[at])) p.erase(at);
+         return p.lines.size();
+       }},
+      {"all beads at a tenth of their speed", false, Defect::kStatedTime,
+       [](Planting& p) {
+         for (std::size_t i = 0; i < p.lines.size(); ++i) {
+           if (Planting::is_bead(p.lines[i]) && p.lines[i].find(" F") != std::string::npos) p.scale(i, 'F', 0.1);
+         }
+         return p.lines.size();
        }},
       {"a number that is none", false, Defect::kUnreadable, [](Planting& p) { return p.replace(p.bead(3, 2), ".", ","); }},
       {"inches", false, Defect::kUnreadable,

@@ -32,6 +32,9 @@ enum class Defect : std::uint8_t {
   kTooHigh,          // above the build height; z
   kTooFast,          // above the fastest speed of the profile; mm/s
   kMeltRate,         // above the material's; mm3/s
+  kTruncated,        // a file of lamina without the sums at its end
+  kStatedFilament,   // another length of filament than a file of lamina states; mm
+  kStatedTime,       // the same of the print time, where the machine is that of the file; s
   kNotes,            // from here on: notes
   kNotWaited = kNotes,  // beads after M104 without M109; degrees
   kHeatersOn,        // the file ends with a heated nozzle; degrees

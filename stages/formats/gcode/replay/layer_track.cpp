@@ -95,7 +95,7 @@ void LayerTrack::compare_rise(double rise, Defects& defects) {
   gap_rise_ = 0;
   const bool may_gap = !below_.part || (rules_.raft_layers > 0 && below_.index <= rules_.raft_layers);
   if (empties_ > 0) {
-    defects.add(Defect::kEmptyLayer, empty_, empty_z_, 0, empties_);
+    if (!may_gap) defects.add(Defect::kEmptyLayer, empty_, empty_z_, 0, empties_);
   } else if (now_.height > 0) {
     if (!may_gap && rise - now_.height > kGap * now_.height) defects.add(Defect::kSkippedLayer, now_.begin(), now_.z, top_);
   } else if (!may_gap && rise_ > 0 && rise > 1.5 * rise_) {

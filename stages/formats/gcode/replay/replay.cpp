@@ -117,6 +117,7 @@ class Replay final : public CommandObserver {
   void check_first_bead();
   void check_machine(const RawBead& raw, double mm3, double length);
   void check_section(double mm3, double length, double height);
+  void compare_stated();
   void finish(ReplayReport& report);
 
   const ReplayOptions options_;
@@ -312,6 +313,18 @@ void Replay::bead(const RawBead& raw) {
     defects_.add(Defect::kDoubledBead, here(), length, 0);
 }
 
+/// The sums at the end of a file of lamina. Its time is a sum over layers, each from standstill to standstill.
+void Replay::compare_stated() {
+  if (!totals_.own || walk_.fault) return;
+  if (totals_.stated_filament_mm == 0) return defects_.add(Defect::kTruncated, here(), 0, 0);
+  const double stated_mm = totals_.stated_filament_mm, stated_s = totals_.stated_seconds;
+  if (std::abs(totals_.filament_mm - stated_mm) > 1e-4 * stated_mm + 0.05)
+    defects_.add(Defect::kStatedFilament, here(), totals_.filament_mm, stated_mm);
+  const bool same_machine = options_.machine != nullptr && options_.machine->name == totals_.machine;
+  if (same_machine && std::abs(totals_.seconds - stated_s) > 0.03 * stated_s + 2)
+    defects_.add(Defect::kStatedTime, here(), totals_.seconds, stated_s);
+}
+
 void Replay::finish(ReplayReport& report) {
   layers_.finish(defects_);
   crossings_.end_layer(defects_);
@@ -331,6 +344,7 @@ void Replay::finish(ReplayReport& report) {
   totals_.mm3 = totals_.filament_mm * filament_mm2_;
   totals_.grams = totals_.mm3 / 1000 * machine_.material.density_g_cm3;
   totals_.machine = walk_.facts.machine;
+  compare_stated();
   report.defects = defects_;
   report.totals = std::move(totals_);
 }
