@@ -63,7 +63,8 @@ class WallCells {
   }
   std::optional<std::size_t> cell_of(double x, double y) const {
     const double column = (x - low_[0]) / kCellMm, row = (y - low_[1]) / kCellMm;
-    if (!(column >= 0 && row >= 0 && column < static_cast<double>(columns_) && row < static_cast<double>(rows_))) return std::nullopt;
+    if (!(column >= 0 && row >= 0 && column < static_cast<double>(columns_) && row < static_cast<double>(rows_)))
+      return std::nullopt;
     return static_cast<std::size_t>(row) * columns_ + static_cast<std::size_t>(column);
   }
   void mark(double x, double y) {
@@ -82,7 +83,8 @@ class WallCells {
 
 class LayerComparison {
  public:
-  LayerComparison(const GcodeFile& file, ModelComparison& result, Faults& faults) : file_(file), result_(result), faults_(faults) {
+  LayerComparison(const GcodeFile& file, ModelComparison& result, Faults& faults)
+      : file_(file), result_(result), faults_(faults) {
     for (const std::string& type : file.types()) roles_.push_back(formats::gcode::role_of(type));
     states_walls_ = std::ranges::find(roles_, BeadRole::kOuter) != roles_.end();
   }
@@ -112,7 +114,7 @@ class LayerComparison {
   std::vector<BeadRole> roles_;
   bool states_walls_ = false;
   std::vector<PrintedLayer> layers_;
-  std::int64_t lift_ = 0;  // nm: the model's bottom, on a raft
+  std::int64_t lift_ = 0;         // nm: the model's bottom, on a raft
   std::vector<double> outlines_;  // shares, of layers_; below 0: no contour
   Box walls_;                     // of the outer edges of walls
 };
@@ -216,8 +218,9 @@ void LayerComparison::report_outlines() {
   for (std::size_t i = 1; i + 1 < outlines_.size(); ++i) {
     const double around = std::min(outlines_[i - 1], outlines_[i + 1]);
     if (outlines_[i] < 0 || around < kPrinted || outlines_[i] >= kLoss * around) continue;
-    faults_.add(fmt::format("layer {}: {:.0f} % of the model's outline have an outer wall, {:.0f} % or more in the layers around it",
-                            layers_[i].first, 100 * outlines_[i], 100 * around));
+    faults_.add(
+        fmt::format("layer {}: {:.0f} % of the model's outline have an outer wall, {:.0f} % or more in the layers around it",
+                    layers_[i].first, 100 * outlines_[i], 100 * around));
   }
 }
 
@@ -227,8 +230,8 @@ Status LayerComparison::compare(const Scene& scene, const Job& job) {
   const Box& model = sections->bounds();
   const double wide[] = {mm(walls_.width()) - mm(model.width()), mm(walls_.depth()) - mm(model.depth())};
   if (std::abs(wide[0]) > 0.5 + 0.02 * mm(model.width()) || std::abs(wide[1]) > 0.5 + 0.02 * mm(model.depth())) {
-    result_.reason = fmt::format("the model is {:.2f} x {:.2f} mm large and the outer walls {:.2f} x {:.2f} mm", mm(model.width()),
-                                 mm(model.depth()), mm(walls_.width()), mm(walls_.depth()));
+    result_.reason = fmt::format("the model is {:.2f} x {:.2f} mm large and the outer walls {:.2f} x {:.2f} mm",
+                                 mm(model.width()), mm(model.depth()), mm(walls_.width()), mm(walls_.depth()));
     return {};
   }
   result_.moved_mm = {(mm(walls_.lo.x) + mm(walls_.hi.x) - mm(model.lo.x) - mm(model.hi.x)) / 2,
@@ -254,7 +257,8 @@ Status LayerComparison::compare(const Scene& scene, const Job& job) {
 
 }  // namespace
 
-Result<ModelComparison> compare_with_model(const std::string& path, const std::string& model, double filament_mm, Faults& faults) {
+Result<ModelComparison> compare_with_model(const std::string& path, const std::string& model, double filament_mm,
+                                           Faults& faults) {
   ModelComparison result;
   formats::GcodeOptions options;
   options.filament_mm = filament_mm;

@@ -24,12 +24,14 @@ struct ModelComparison {
 };
 inline constexpr double kNearMm = 0.9;
 
-/// Slices the model at the middles of the file's layers and moves it in x and y to the box of the outer walls. Supports and skirts by
-/// their types are left out. A layer of which less of the outline has an outer wall than of its neighbours is a fault.
+/// Slices the model at the middles of the file's layers and moves it in x and y to the box of the outer walls. Supports and
+/// skirts by their types are left out. A layer of which less of the outline has an outer wall than of its neighbours is a
+/// fault.
 ///
 /// filament_mm  diameter; 0: the file's
 /// errors       kUsage, kInput: the model or the file cannot be read
 /// cost         that of a slice; beads of a layer at a time
-Result<ModelComparison> compare_with_model(const std::string& path, const std::string& model, double filament_mm, Faults& faults);
+Result<ModelComparison> compare_with_model(const std::string& path, const std::string& model, double filament_mm,
+                                           Faults& faults);
 
 }  // namespace lamina::pipeline

@@ -31,9 +31,7 @@ struct ComparedBead {
 
   auto key() const { return std::tie(from_x, from_y, to_x, to_y, type); }
   bool operator<(const ComparedBead& other) const { return key() < other.key(); }
-  double length_mm() const {
-    return std::hypot(static_cast<double>(to_x - from_x), static_cast<double>(to_y - from_y)) / 1000;
-  }
+  double length_mm() const { return std::hypot(static_cast<double>(to_x - from_x), static_cast<double>(to_y - from_y)) / 1000; }
   /// E has five decimals: 2.4e-5 mm3, at both ends.
   bool same_volume(const ComparedBead& other) const {
     return width == other.width && std::abs(mm3 - other.mm3) <= 1e-4 + 1e-3 * other.mm3;
@@ -172,8 +170,8 @@ std::string job_again(const ManifestHead& head, const std::vector<std::string>& 
 
 }  // namespace
 
-Result<PlanComparison> compare_with_plan(const std::string& path, const ManifestHead& head, const std::vector<std::string>& folders,
-                                         const std::string& machine, Faults& faults) {
+Result<PlanComparison> compare_with_plan(const std::string& path, const ManifestHead& head,
+                                         const std::vector<std::string>& folders, const std::string& machine, Faults& faults) {
   PlanComparison result;
   Job job;
   result.reason = job_again(head, folders, machine, job);

@@ -80,12 +80,12 @@ Summary::Lines ToolpathCheck::lines() const {
   line("layers", fmt::format("{}, {} beads, {:.2f} m; {} travels, {:.2f} m; {} retractions", readable_count(t.layers),
                              readable_count(t.beads), t.bead_mm / 1000, readable_count(t.travels), t.travel_mm / 1000,
                              readable_count(t.retractions)));
-  line("filament", fmt::format("{:.1f} mm of {:g} mm, {:.2f} cm3, {:.2f} g", t.filament_mm, t.diameter_mm, t.mm3 / 1000, t.grams));
+  line("filament",
+       fmt::format("{:.1f} mm of {:g} mm, {:.2f} cm3, {:.2f} g", t.filament_mm, t.diameter_mm, t.mm3 / 1000, t.grams));
   const std::string stated =
       t.stated_seconds > 0 ? fmt::format("; the file states {}", formats::gcode::time_text(t.stated_seconds)) : "";
   line("printing", fmt::format("about {}{}", formats::gcode::time_text(t.seconds), stated));
-  if (t.nozzle_degc[1] > 0)
-    line("heat", fmt::format("nozzle {}, bed {}", range_text(t.nozzle_degc), range_text(t.bed_degc)));
+  if (t.nozzle_degc[1] > 0) line("heat", fmt::format("nozzle {}, bed {}", range_text(t.nozzle_degc), range_text(t.bed_degc)));
   line("speed", fmt::format("beads up to {:.1f} mm/s, travels up to {:.1f} mm/s, up to {:.2f} mm3/s (line {})", t.max_bead_mm_s,
                             t.max_travel_mm_s, t.max_melt_mm3_s, t.max_melt_at.line));
   line("box", fmt::format("{:.3f} to {:.3f}, {:.3f} to {:.3f}, {:.3f} to {:.3f} mm", t.low[0], t.high[0], t.low[1], t.high[1],
@@ -98,11 +98,12 @@ Summary::Lines ToolpathCheck::lines() const {
   }
   if (model && !model->reason.empty()) line("model", "not compared: " + model->reason);
   if (model && model->reason.empty()) {
-    line("model", fmt::format("{} layers; {:.2f} cm3 of beads in {:.2f} cm3, {:.1f} % on average, {:.1f} % (layer {}) to {:.1f} % "
-                              "(layer {}); outer walls along {:.0f} % of the outline or more (layer {})",
-                              model->layers, model->bead_mm3 / 1000, model->model_mm3 / 1000, 100 * model->mean_fill(),
-                              100 * model->min_fill.value, model->min_fill.layer, 100 * model->max_fill.value, model->max_fill.layer,
-                              100 * model->min_outline.value, model->min_outline.layer));
+    line("model",
+         fmt::format("{} layers; {:.2f} cm3 of beads in {:.2f} cm3, {:.1f} % on average, {:.1f} % (layer {}) to {:.1f} % "
+                     "(layer {}); outer walls along {:.0f} % of the outline or more (layer {})",
+                     model->layers, model->bead_mm3 / 1000, model->model_mm3 / 1000, 100 * model->mean_fill(),
+                     100 * model->min_fill.value, model->min_fill.layer, 100 * model->max_fill.value, model->max_fill.layer,
+                     100 * model->min_outline.value, model->min_outline.layer));
   }
   for (std::size_t k = 0; k < kDefects; ++k) {
     const auto kind = static_cast<Defect>(k);
@@ -120,12 +121,12 @@ Json ToolpathCheck::json() const {
     const DefectCount& of = replay.defects[kind];
     if (of.count == 0) continue;
     defects.push_back({{"kind", std::string(defect_name(kind))},
-                        {"fault", is_fault(kind)},
-                        {"count", of.count},
-                        {"line", of.first.line},
-                        {"layer", of.first.layer},
-                        {"value", of.value},
-                        {"limit", of.limit}});
+                       {"fault", is_fault(kind)},
+                       {"count", of.count},
+                       {"line", of.first.line},
+                       {"layer", of.first.layer},
+                       {"value", of.value},
+                       {"limit", of.limit}});
   }
   Json json = {{"layers", t.layers},
                {"beads", t.beads},
@@ -152,16 +153,23 @@ Json ToolpathCheck::json() const {
   for (const double at : t.high) json["high_mm"].push_back(at);
   if (!machine.empty()) json["machine"] = machine;
   if (model) {
-    json["model"] = {{"compared", model->reason.empty()},   {"reason", model->reason},
-                     {"layers", model->layers},             {"model_mm3", model->model_mm3},
-                     {"bead_mm3", model->bead_mm3},         {"mean_fill", model->mean_fill()},
-                     {"min_fill", model->min_fill.value},   {"min_fill_layer", model->min_fill.layer},
-                     {"max_fill", model->max_fill.value},   {"max_fill_layer", model->max_fill.layer},
-                     {"min_outline", model->min_outline.value}, {"min_outline_layer", model->min_outline.layer}};
+    json["model"] = {{"compared", model->reason.empty()},
+                     {"reason", model->reason},
+                     {"layers", model->layers},
+                     {"model_mm3", model->model_mm3},
+                     {"bead_mm3", model->bead_mm3},
+                     {"mean_fill", model->mean_fill()},
+                     {"min_fill", model->min_fill.value},
+                     {"min_fill_layer", model->min_fill.layer},
+                     {"max_fill", model->max_fill.value},
+                     {"max_fill_layer", model->max_fill.layer},
+                     {"min_outline", model->min_outline.value},
+                     {"min_outline_layer", model->min_outline.layer}};
   }
   if (plan) {
-    json["plan"] = {{"compared", plan->reason.empty()}, {"beads", plan->planned},   {"missing", plan->missing},
-                    {"added", plan->added},             {"changed", plan->changed}, {"reason", plan->reason}};
+    json["plan"] = {{"compared", plan->reason.empty()}, {"beads", plan->planned},
+                    {"missing", plan->missing},         {"added", plan->added},
+                    {"changed", plan->changed},         {"reason", plan->reason}};
   }
   return json;
 }

@@ -14,7 +14,8 @@ constexpr const char* kHeat = "M104 S210\nM109 S210\nG28\nG90\nM83\n";
 
 /// A square of 20 mm, 0.4 mm wide and 0.2 mm high: 0.03159 mm of filament a mm.
 std::string square(double z) {
-  return ";LAYER_CHANGE\n;Z:" + std::to_string(z) + "\n;HEIGHT:0.2\n;TYPE:External perimeter\n;WIDTH:0.4\nG1 Z" + std::to_string(z) +
+  return ";LAYER_CHANGE\n;Z:" + std::to_string(z) + "\n;HEIGHT:0.2\n;TYPE:External perimeter\n;WIDTH:0.4\nG1 Z" +
+         std::to_string(z) +
          " F600\nG0 X10 Y10 F9000\nG1 X30 Y10 E0.6317 F1800\nG1 X30 Y30 E0.6317\nG1 X10 Y30 E0.6317\nG1 X10 Y10 E0.6317\n";
 }
 
@@ -68,7 +69,8 @@ TEST(GcodeReplay, LayersFollowEachOtherUpwards) {
   EXPECT_EQ(found(replay(kHeat + square(0.2) + square(0.4) + square(0.3) + "M104 S0\n")), "layer-order");
   EXPECT_EQ(found(replay(kHeat + square(-0.2) + "M104 S0\n")), "below-bed");
   EXPECT_EQ(found(replay(kHeat + square(2.2) + "M104 S0\n")), "late-layer");
-  EXPECT_EQ(found(replay(kHeat + square(0.2) + ";LAYER_CHANGE\n;Z:0.4\n;HEIGHT:0.2\n" + square(0.6) + "M104 S0\n")), "empty-layer");
+  EXPECT_EQ(found(replay(kHeat + square(0.2) + ";LAYER_CHANGE\n;Z:0.4\n;HEIGHT:0.2\n" + square(0.6) + "M104 S0\n")),
+            "empty-layer");
   // Parts one after another begin again at the bed; a support layer may have a gap above it.
   const std::string two = square(0.2) + square(0.4);
   EXPECT_EQ(found(replay(kHeat + two + "G0 X0 Y10\nG0 X0 Y9\n" + two + "M104 S0\n")), "");
@@ -131,7 +133,8 @@ TEST(GcodeReplay, BeadsAreDepositedOnce) {
 
 TEST(GcodeReplay, ATravelThroughAWallIsANoteUnlessTheFilamentIsDrawnBack) {
   const std::string line = ";TYPE:Internal infill\n;WIDTH:0.4\n";
-  const ReplayReport report = replay(kHeat + square(0.2) + "G0 X15 Y15\nG0 X40 Y20\n" + line + "G1 X50 Y20 E0.31585\nM104 S0\n");
+  const ReplayReport report =
+      replay(kHeat + square(0.2) + "G0 X15 Y15\nG0 X40 Y20\n" + line + "G1 X50 Y20 E0.31585\nM104 S0\n");
   EXPECT_EQ(found(report), "wall-crossing");
   EXPECT_EQ(report.defects[Defect::kCrossing].count, 1u);
   EXPECT_EQ(report.defects.faults(), 0u);

@@ -220,7 +220,8 @@ const std::vector<Planted>& filament_faults() {
          p.erase(p.in(1, "G92 E0"));
          return p.in(1, "G1 E") + 1;
        }},
-      {"E set to 0 within a layer", true, Defect::kThickBead, [](Planting& p) { return p.insert(p.bead(4, 20), "G92 E0") + 1; }},
+      {"E set to 0 within a layer", true, Defect::kThickBead,
+       [](Planting& p) { return p.insert(p.bead(4, 20), "G92 E0") + 1; }},
       {"lost retraction", false, Defect::kOverfed,
        [](Planting& p) {
          p.erase(p.in(4, "G1 E-"));
@@ -345,7 +346,8 @@ const std::vector<Planted>& path_faults() {
       {"doubled wall", false, Defect::kDoubledBead,
        [](Planting& p) {
          const auto [first, last] = path_of(p, 5, 0);
-         const Lines copy(p.lines.begin() + static_cast<std::ptrdiff_t>(first), p.lines.begin() + static_cast<std::ptrdiff_t>(last));
+         const Lines copy(p.lines.begin() + static_cast<std::ptrdiff_t>(first),
+                          p.lines.begin() + static_cast<std::ptrdiff_t>(last));
          p.lines.insert(p.lines.begin() + static_cast<std::ptrdiff_t>(last), copy.begin(), copy.end());
          return p.next_bead(last) + 1;
        }},

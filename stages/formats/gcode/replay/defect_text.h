@@ -8,7 +8,8 @@
 
 namespace lamina::formats::gcode {
 
-/// One line on a kind of defects: "line 1234: a bead at 150 degC, below the 170 degC at which firmwares feed (layer 12; 7 in all)".
+/// One line on a kind of defects: "line 1234: a bead at 150 degC, below the 170 degC at which firmwares feed (layer 12; 7 in
+/// all)".
 std::string defect_text(Defect kind, const DefectCount& of);
 /// A short name: "cold-extrusion".
 std::string_view defect_name(Defect kind);

@@ -7,8 +7,8 @@
 
 namespace lamina::formats::gcode {
 
-/// The beads of a layer by their ends, in micrometres, and their direction. A table of hashes of 64 bits: two beads of a layer are taken for
-/// one with a probability of about 1e-12. Memory: 32 bytes a bead of the largest layer.
+/// The beads of a layer by their ends, in micrometres, and their direction. A table of hashes of 64 bits: two beads of a layer
+/// are taken for one with a probability of about 1e-12. Memory: 32 bytes a bead of the largest layer.
 class DepositedBeads {
  public:
   void next_layer();

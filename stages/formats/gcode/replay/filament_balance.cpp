@@ -52,8 +52,8 @@ void FilamentBalance::bead(FileLine at) {
 
 void FilamentBalance::finish(Defects& defects) const {
   const auto* end = balances_.data() + size_;
-  const auto* usual = std::max_element(
-      balances_.data(), end, [](const PauseBalance& a, const PauseBalance& b) { return a.count < b.count; });
+  const auto* usual =
+      std::max_element(balances_.data(), end, [](const PauseBalance& a, const PauseBalance& b) { return a.count < b.count; });
   if (usual == end) return;
   for (const auto* one = balances_.data(); one != end; ++one) {
     const double more = one->mm - usual->mm;

@@ -1,4 +1,5 @@
-// stages/formats/gcode/replay/filament_balance.h: compares what is drawn back between two beads with what is fed before the second.
+// stages/formats/gcode/replay/filament_balance.h: compares what is drawn back between two beads with what is fed before the
+// second.
 #pragma once
 
 #include <array>
@@ -9,9 +10,9 @@
 
 namespace lamina::formats::gcode {
 
-/// Filament moved between beads: on the spot, or drawn back along a way. All of a file's pauses have one balance: 0, or the extra length of
-/// Slic3r, PrusaSlicer (retract_restart_extra) and Cura (retraction_extra_prime_amount). The most frequent balance is taken for it; others
-/// are faults. Memory: a table of kBalances balances.
+/// Filament moved between beads: on the spot, or drawn back along a way. All of a file's pauses have one balance: 0, or the
+/// extra length of Slic3r, PrusaSlicer (retract_restart_extra) and Cura (retraction_extra_prime_amount). The most frequent
+/// balance is taken for it; others are faults. Memory: a table of kBalances balances.
 class FilamentBalance {
  public:
   static constexpr double kToleranceMm = 0.1;  // of filament

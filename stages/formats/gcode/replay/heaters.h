@@ -9,7 +9,8 @@
 
 namespace lamina::formats::gcode {
 
-/// Follows M104, M109, M140, M190 (Marlin, Klipper), G10 P S and M568 (RepRapFirmware), M302, and waits: M109, M116, TEMPERATURE_WAIT.
+/// Follows M104, M109, M140, M190 (Marlin, Klipper), G10 P S and M568 (RepRapFirmware), M302, and waits: M109, M116,
+/// TEMPERATURE_WAIT.
 class Heaters {
  public:
   /// Marlin's EXTRUDE_MINTEMP (Configuration.h) and Klipper's min_extrude_temp (klippy/kinematics/heaters.py) are 170 degC;

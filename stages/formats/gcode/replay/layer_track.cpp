@@ -19,14 +19,13 @@ BeadRole role_of(std::string_view type) {
     BeadRole role;
   };
   // The first part that the type contains decides: PrusaSlicer, Slic3r, lamina; Orca, BambuStudio; Cura.
-  constexpr RoleWord kParts[] = {{"upport", BeadRole::kSupport},          {"SUPPORT", BeadRole::kSupport},
-                                 {"kirt", BeadRole::kSupport},            {"SKIRT", BeadRole::kSupport},
-                                 {"Brim", BeadRole::kSupport},            {"tower", BeadRole::kSupport},
-                                 {"PRIME", BeadRole::kSupport},           {"Raft", BeadRole::kSupport},
-                                 {"Custom", BeadRole::kSupport},          {"xternal perimeter", BeadRole::kOuter},
-                                 {"verhang", BeadRole::kOuter},           {"uter wall", BeadRole::kOuter},
-                                 {"WALL-OUTER", BeadRole::kOuter},        {"erimeter", BeadRole::kInner},
-                                 {"nner wall", BeadRole::kInner},         {"WALL-INNER", BeadRole::kInner}};
+  constexpr RoleWord kParts[] = {
+      {"upport", BeadRole::kSupport},          {"SUPPORT", BeadRole::kSupport}, {"kirt", BeadRole::kSupport},
+      {"SKIRT", BeadRole::kSupport},           {"Brim", BeadRole::kSupport},    {"tower", BeadRole::kSupport},
+      {"PRIME", BeadRole::kSupport},           {"Raft", BeadRole::kSupport},    {"Custom", BeadRole::kSupport},
+      {"xternal perimeter", BeadRole::kOuter}, {"verhang", BeadRole::kOuter},   {"uter wall", BeadRole::kOuter},
+      {"WALL-OUTER", BeadRole::kOuter},        {"erimeter", BeadRole::kInner},  {"nner wall", BeadRole::kInner},
+      {"WALL-INNER", BeadRole::kInner}};
   for (const auto& [part, role] : kParts) {
     if (type.find(part) != std::string_view::npos) return role;
   }

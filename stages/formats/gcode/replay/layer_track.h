@@ -9,7 +9,8 @@
 
 namespace lamina::formats::gcode {
 
-/// What the types of beads of the slicers are: `External perimeter` (PrusaSlicer), `Outer wall` (Orca, BambuStudio), `WALL-OUTER` (Cura).
+/// What the types of beads of the slicers are: `External perimeter` (PrusaSlicer), `Outer wall` (Orca, BambuStudio),
+/// `WALL-OUTER` (Cura).
 enum class BeadRole : std::uint8_t { kOther, kOuter, kInner, kSupport };
 BeadRole role_of(std::string_view type);
 

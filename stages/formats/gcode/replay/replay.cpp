@@ -88,7 +88,12 @@ Extruder timing_machine(const ReplayOptions& options, const HeadFacts& facts) {
 class Replay final : public CommandObserver {
  public:
   Replay(FileReader& reader, const ReplayOptions& options, const HeadFacts& facts)
-      : options_(options), machine_(timing_machine(options, facts)), walk_(reader, types_), rules_{facts.own, facts.raft_layers, machine_.material.nozzle_mm}, layers_(rules_), time_(machine_) {
+      : options_(options),
+        machine_(timing_machine(options, facts)),
+        walk_(reader, types_),
+        rules_{facts.own, facts.raft_layers, machine_.material.nozzle_mm},
+        layers_(rules_),
+        time_(machine_) {
     filament_mm2_ = std::numbers::pi / 4 * machine_.material.filament_mm * machine_.material.filament_mm;
     volumetric_ = facts.slicer.volumetric;
     totals_.own = facts.own;
@@ -140,7 +145,7 @@ class Replay final : public CommandObserver {
   double net_ = 0, fed_ = 0;  // mm of filament of all moves, and of those that deposit
   FileLine back_;             // the first move that draws filament back along its way
   bool volumetric_ = false, homed_ = false;
-  bool retracted_ = false;       // by G10
+  bool retracted_ = false;        // by G10
   std::uint64_t flat_beads_ = 0;  // since the last one that climbs
 };
 
@@ -309,8 +314,7 @@ void Replay::bead(const RawBead& raw) {
   if (flat_beads_ == 0) ++totals_.climbing;
   if (flat_beads_ == totals_.beads || flat_beads_ > kAfterClimb) check_section(mm3, length, now.height);
   if (options_.machine != nullptr) check_machine(raw, mm3, length);
-  if (length >= BeadSections::kMinMm && deposited_.add(raw.from, raw.to))
-    defects_.add(Defect::kDoubledBead, here(), length, 0);
+  if (length >= BeadSections::kMinMm && deposited_.add(raw.from, raw.to)) defects_.add(Defect::kDoubledBead, here(), length, 0);
 }
 
 /// The sums at the end of a file of lamina. Its time is a sum over layers, each from standstill to standstill.

@@ -25,18 +25,18 @@ struct ReplayOptions {
 struct ReplayTotals {
   std::uint32_t layers = 0;
   std::uint64_t beads = 0, climbing = 0, travels = 0, retractions = 0, lines = 0;
-  double bead_mm = 0, travel_mm = 0;  // climbing: beads, of spirals
+  double bead_mm = 0, travel_mm = 0;           // climbing: beads, of spirals
   double filament_mm = 0, mm3 = 0, grams = 0;  // net, of beads; filament_mm of the diameter below
   double diameter_mm = 1.75;
-  double seconds = 0;                                       // by acceleration and corner speed (print_time.h)
-  double max_bead_mm_s = 0, max_travel_mm_s = 0;            // commanded
-  double max_melt_mm3_s = 0;                                // of beads of 1 mm or more
+  double seconds = 0;                             // by acceleration and corner speed (print_time.h)
+  double max_bead_mm_s = 0, max_travel_mm_s = 0;  // commanded
+  double max_melt_mm3_s = 0;                      // of beads of 1 mm or more
   FileLine max_melt_at;
-  std::array<double, 2> nozzle_degc{}, bed_degc{};          // lowest and highest, of beads; 0: not commanded
-  std::array<double, 3> low{}, high{};                      // mm, of the ends of beads
-  double stated_seconds = 0, stated_filament_mm = 0;        // by comments of the file; 0: none
-  bool own = false;                                         // lamina wrote it
-  std::string machine;                                      // that it names
+  std::array<double, 2> nozzle_degc{}, bed_degc{};    // lowest and highest, of beads; 0: not commanded
+  std::array<double, 3> low{}, high{};                // mm, of the ends of beads
+  double stated_seconds = 0, stated_filament_mm = 0;  // by comments of the file; 0: none
+  bool own = false;                                   // lamina wrote it
+  std::string machine;                                // that it names
 };
 
 struct ReplayReport {

@@ -23,7 +23,8 @@ bool cuts(const std::array<double, 4>& travel, const std::array<float, 4>& wall,
 }  // namespace
 
 void WallCrossings::wall(const double* from, const double* to) {
-  walls_.push_back({{static_cast<float>(from[0]), static_cast<float>(from[1]), static_cast<float>(to[0]), static_cast<float>(to[1])}});
+  walls_.push_back(
+      {{static_cast<float>(from[0]), static_cast<float>(from[1]), static_cast<float>(to[0]), static_cast<float>(to[1])}});
 }
 
 void WallCrossings::travel(const double* from, const double* to, FileLine at) {

@@ -9,8 +9,8 @@
 
 namespace lamina::formats::gcode {
 
-/// Collects the outer walls and travels of a layer, deposited in any order, and counts the travels that cross a wall, at its end. Travels
-/// that begin or end at a wall do not cross it.
+/// Collects the outer walls and travels of a layer, deposited in any order, and counts the travels that cross a wall, at its
+/// end. Travels that begin or end at a wall do not cross it.
 ///
 /// memory  of the largest layer: 20 bytes a wall's bead, 40 a travel
 class WallCrossings {
@@ -33,7 +33,8 @@ class WallCrossings {
   };
   void sort_walls();
   bool crosses(const OpenTravel& travel) const;
-  /// Calls visit(first, last), the cells that a segment within the grid passes, row by row, until it returns true. returns  whether it did
+  /// Calls visit(first, last), the cells that a segment within the grid passes, row by row, until it returns true. returns
+  /// whether it did
   template <class Visit>
   bool each_row(const std::array<double, 4>& ends, Visit visit) const;
   std::uint32_t cell_of(double at, std::size_t axis) const;
