@@ -99,6 +99,8 @@ TEST_F(VerifiedToolpaths, OfOtherProgramsAreReplayedAlone) {
   expect_refused("verify part.stl", 2, "part.stl", folder_);
   expect_refused("verify part.gcode --machine unknown", 2, "unknown", folder_);
   expect_refused("verify part.gcode --filament 0", 2, "--filament", folder_);
+  expect_refused("verify part.gcode --material petg", 2, "--material: needs --machine", folder_);
+  expect_refused("verify . --model part.stl", 2, "--model: is of G-code files", folder_);
 }
 
 TEST_F(VerifiedToolpaths, HaveTheWallsOfAModel) {

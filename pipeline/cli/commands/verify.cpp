@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "pipeline/check/toolpaths.h"
 #include "pipeline/check/verify.h"
@@ -63,6 +64,19 @@ Json report_json(const VerifyReport& report) {
   return json;
 }
 
+/// errors  kUsage: options of G-code files with a directory
+Status check_toolpath_options(const Arguments& arguments) {
+  std::error_code ignored;
+  for (const std::string& operand : arguments.operands) {
+    if (!std::filesystem::is_directory(operand, ignored)) continue;
+    for (const char* option : {"--machine", "--material", "--filament", "--model", "--parts"}) {
+      if (arguments.has(option)) return at_option(option, "is of G-code files, and " + operand + " is a directory");
+    }
+  }
+  if (arguments.has("--material") && !arguments.has("--machine")) return at_option("--material", "needs --machine");
+  return {};
+}
+
 /// The sums of a replayed G-code file, also of one with faults.
 void say_toolpaths(const VerifyReport& report, Answer& answer) {
   if (!report.toolpaths) return;
@@ -77,6 +91,7 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
     return at_option("--quote", "needs the replay of programs; remove --quick");
   if (Status status = check_quote(arguments, arguments.operands.front()); !status) return status;
   if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
+  if (Status status = check_toolpath_options(arguments); !status) return status;
   VerifyOptions options;
   options.quick = arguments.has("--quick");
   if (Status status = arguments.read("--memory", read_bytes, options.memory_bytes); !status) return status;
