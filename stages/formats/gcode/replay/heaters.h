@@ -13,8 +13,8 @@ namespace lamina::formats::gcode {
 /// TEMPERATURE_WAIT.
 class Heaters {
  public:
-  /// Marlin's EXTRUDE_MINTEMP (Configuration.h) and Klipper's min_extrude_temp (klippy/kinematics/heaters.py) are 170 degC;
-  /// RepRapFirmware's is 160 (RepRapFirmware @3.5, Configuration.h: HOT_ENOUGH_TO_EXTRUDE).
+  /// Marlin's EXTRUDE_MINTEMP (Configuration.h) and Klipper's min_extrude_temp (klippy/extras/heaters.py) are 170 degC;
+  /// RepRapFirmware's is 160 (src/Config/Configuration.h: HOT_ENOUGH_TO_EXTRUDE).
   static constexpr double kMinDegc = 170, kRepRapMinDegc = 160;
 
   void command(char letter, double code, const GcodeWords& words, std::uint8_t tool);
