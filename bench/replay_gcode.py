@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""bench/replay_gcode.py: what lamina verify reports of G-code files of other slicers. scripts/bench replay_gcode
+"""bench/replay_gcode.py: what lamina verify reports of G-code files of other slicers.
 
     bench/replay_gcode.py LAMINA [--models DIR] [--corpus DIR] [--cache DIR] [--write]
 
