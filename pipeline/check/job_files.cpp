@@ -34,6 +34,15 @@ Error changed(const std::string& path) { return wrong(path, "is not the file of 
 
 }  // namespace
 
+std::string find_part(const std::string& name, const std::vector<std::string>& folders) {
+  std::error_code ignored;
+  for (const fs::path folder : folders) {
+    if (fs::is_regular_file(folder, ignored) && folder.filename() == name) return folder.string();
+    if (fs::is_regular_file(folder / name, ignored)) return (folder / name).string();
+  }
+  return {};
+}
+
 Result<replay::VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head) {
   const std::string name = "program/machine.toml";
   std::string fault = fault_of_file(directory, name, head.machine_profile);

@@ -18,6 +18,9 @@ namespace lamina::pipeline {
 /// Of the program of a layer.
 inline constexpr std::uint64_t kMaxProgramBytes = 4ull << 30;
 
+/// The path of a part by its name, in folders (entries may also be files); empty: in none of them.
+std::string find_part(const std::string& name, const std::vector<std::string>& folders);
+
 /// The machine of program/machine.toml; it must match the manifest.
 /// errors  kVerification: missing, changed, or of another job; begins with the file's path in the directory
 Result<replay::VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head);

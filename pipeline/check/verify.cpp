@@ -14,6 +14,7 @@
 
 #include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
+#include "pipeline/check/toolpaths.h"
 #include "pipeline/manifest/compare.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
@@ -351,14 +352,36 @@ VerifyReport verify_paths(const std::string& name, const std::string& directory,
   return report;
 }
 
-/// A toolpath file, by the manifest next to it.
-Result<VerifyReport> verify_file(const std::string& path) {
+/// Replays a G-code file. errors  of check_toolpaths
+Status replay_file(const std::string& path, const VerifyOptions& options, const ManifestHead* head, VerifyReport& report) {
+  auto check = check_toolpaths(path, options.toolpaths, head, report);
+  if (!check) return check.error();
+  report.toolpaths = std::make_shared<ToolpathCheck>(std::move(*check));
+  return {};
+}
+
+/// A file of another program, or one whose manifest is not there.
+Result<VerifyReport> verify_third_party(const std::string& path, const VerifyOptions& options) {
+  VerifyReport report;
+  report.directory = path;
+  report.recorded = false;
+  std::error_code error;
+  report.bytes = fs::file_size(path, error);
+  if (Status status = replay_file(path, options, nullptr, report); !status) return status.error();
+  report.layers = report.toolpaths->replay.totals.layers;
+  return report;
+}
+
+/// A toolpath file, by the manifest next to it and by a replay.
+Result<VerifyReport> verify_file(const std::string& path, const VerifyOptions& options) {
   const std::string manifest_path = path + ".json";
   if (fs::path(path).filename() == "manifest.json")
     return Error{Fault::kUsage, fmt::format("{}: is the manifest of a job; name its directory", path)};
   std::error_code error;
   if (!fs::is_regular_file(manifest_path, error)) {
     const bool begun = fs::is_regular_file(manifest_path + ".part", error);
+    const bool alone = !begun && !fs::exists(fs::symlink_status(manifest_path, error));
+    if (alone && !options.quick && fs::path(path).extension() != ".sml") return verify_third_party(path, options);
     return Error{Fault::kVerification,
                  fmt::format("{}: {}", path,
                              begun ? "job was interrupted; run again with --resume"
@@ -368,12 +391,35 @@ Result<VerifyReport> verify_file(const std::string& path) {
   const auto manifest = read_manifest(manifest_path);
   if (!manifest) return manifest.error();
   const fs::path folder = fs::path(path).parent_path();
-  return verify_paths(path, folder.empty() ? "." : folder.string(), *manifest);
+  const std::string directory = folder.empty() ? "." : folder.string();
+  VerifyReport recorded = verify_paths(path, directory, *manifest);
+  if (options.quick || manifest->head.format != "gcode") return recorded;
+  VerifyReport report;
+  if (Status status = replay_file(path, options, &manifest->head, report); !status) {
+    report = std::move(recorded);
+    report.add(status.error().message);
+    return report;
+  }
+  // Equal bytes have equal beads; the plan locates a difference of bytes.
+  if (!recorded.ok() || !options.toolpaths.parts.empty()) {
+    std::vector<std::string> folders = options.toolpaths.parts;
+    folders.insert(folders.end(), {".", directory, fs::path(directory).parent_path().string()});
+    auto plan = compare_with_plan(path, manifest->head, folders, options.toolpaths.machine, report);
+    if (!plan) return plan.error();
+    report.toolpaths->plan = std::move(*plan);
+  }
+  // Where a line is added all later layers differ from their records: those come last.
+  report.directory = recorded.directory;
+  report.layers = recorded.layers;
+  report.bytes = recorded.bytes;
+  for (std::string& fault : recorded.faults) report.add(std::move(fault));
+  report.fault_count += recorded.fault_count - recorded.faults.size();
+  return report;
 }
 
 Result<VerifyReport> verify_any(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
-  if (fs::is_regular_file(directory, error)) return verify_file(directory);
+  if (fs::is_regular_file(directory, error)) return verify_file(directory, options);
   if (!fs::is_directory(directory, error)) {
     return Error{Fault::kUsage, fmt::format("{}: no such directory or file; name what lamina jet, lamina slice or lamina "
                                             "extrude wrote",

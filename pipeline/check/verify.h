@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,9 +13,20 @@
 
 namespace lamina::pipeline {
 
+struct ToolpathCheck;  // pipeline/check/toolpaths.h
+
+/// Of G-code files.
+struct ToolpathOptions {
+  std::string machine, material;   // of `lamina extrude`; empty: the recorded ones, or no rules of a machine
+  std::vector<std::string> parts;  // folders or files of the parts of a file of lamina
+  std::string model;               // the part of a file of any slicer; empty: not compared
+  double filament_mm = 0;          // diameter; 0: the file's
+};
+
 struct VerifyOptions {
   bool quick = false;  // sizes and hashes only; images are not decoded
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // of layers in flight
+  ToolpathOptions toolpaths;
 };
 
 /// Faults are in layer order, then stray files, then missing shards.
@@ -29,6 +41,8 @@ struct VerifyReport : Faults {
   std::vector<UnfedPowder> unfed;     // by material, of a job with several and a machine
   replay::Material material;          // used up
   double coverage = 0;                // drops / pixels of the replayed layers
+  std::shared_ptr<ToolpathCheck> toolpaths;  // of a replayed G-code file; else null
+  bool recorded = true;                      // compared with a manifest
   Summary use;                        // what they use up and cost: lines, facts, table; empty without programs
 };
 
@@ -37,7 +51,8 @@ struct VerifyReport : Faults {
 /// layer's print program on a virtual machine, which must print that image bit for bit. Files in layers/ and program/
 /// without an entry in a manifest are faults, and so are an interrupted job and shards that are missing.
 ///
-/// directory  or a file of toolpaths; toolpaths and contours are compared by the bytes of file and layers (compare_paths)
+/// directory  or a file of toolpaths; toolpaths and contours are compared by the bytes of file and layers (compare_paths). G-code, with or
+///            without a manifest, is replayed too (check/toolpaths.h), unless quick
 /// errors  kVerification: manifest missing or unreadable; kUsage: no such directory or file; kMemory
 /// cost    reads every file once, and again to decode it; parallel over layers; memory of a few layers' runs
 Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options);

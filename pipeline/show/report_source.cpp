@@ -174,16 +174,6 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
   return source;
 }
 
-/// The file of that name in the first folder that contains it; empty if none does.
-std::string find_part(const std::string& name, const std::vector<std::string>& folders) {
-  std::error_code ignored;
-  for (const fs::path folder : folders) {
-    if (fs::is_regular_file(folder, ignored) && folder.filename() == name) return folder.string();
-    if (fs::is_regular_file(folder / name, ignored)) return (folder / name).string();
-  }
-  return {};
-}
-
 }  // namespace
 
 Result<ReportSource> report_source(const std::string& path) {

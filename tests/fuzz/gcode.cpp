@@ -1,10 +1,26 @@
 // G-code of extrusion printers, by any slicer.
 #include "stages/formats/gcode/read_gcode.h"
+#include "stages/formats/gcode/replay/defect_text.h"
+#include "stages/formats/gcode/replay/replay.h"
 
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
 namespace {
+
+/// The replay accepts what the reader accepts, and describes all that it finds.
+void replay(const std::string& path, bool readable) {
+  using namespace formats::gcode;
+  static const Extruder machine;
+  const auto report = replay_gcode(path, {&machine, 0});
+  if (!report) return check_error(report.error());
+  law(!readable || report->unreadable.empty(), "the reader accepts it");
+  law(report->totals.seconds >= 0, "a negative time");
+  for (std::size_t k = 0; k < kDefects; ++k) {
+    const auto kind = static_cast<Defect>(k);
+    if (report->defects[kind].count > 0) check_line(defect_text(kind, report->defects[kind]));
+  }
+}
 
 bool read_gcode(std::string_view text) {
   static MemoryFile memory("part.gcode");
@@ -13,7 +29,9 @@ bool read_gcode(std::string_view text) {
   options.max_beads = 200'000;
   if (dice.below(2) == 0) options.filament_mm = 2.85;
   if (dice.below(3) == 0) options.layer_height_mm = 0.25;
-  const auto file = formats::GcodeFile::open(memory.hold(text), options);
+  const std::string path = memory.hold(text);
+  const auto file = formats::GcodeFile::open(path, options);
+  replay(path, file.ok());
   if (!file) return check_error(file.error()), false;
   law(file->count() > 0 && !file->box().empty(), "no layer");
   for (std::uint32_t i = 0; i < std::min(file->count(), 6u); ++i) {

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
+#include "pipeline/check/toolpaths.h"
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
@@ -20,12 +22,18 @@ CommandSpec verify_spec() {
   CommandSpec spec;
   spec.summary =
       "Checks a job: file sizes and hashes, decoded pixels, files that do not belong to it, and a replay of the print\n"
-      "program by the firmware's rules. Exit code 5 if anything differs.";
+      "program by the firmware's rules. G-code, also of other slicers, is replayed: heat, filament, layers, speeds and the\n"
+      "machine's limits. Exit code 5 for faults.";
   spec.operand = "DIR|GCODE|SML";
-  spec.operand_meaning = "directories of lamina jet or lamina slice, or G-code or SML files of lamina extrude";
+  spec.operand_meaning = "directories of lamina jet or lamina slice, SML files, or G-code files of any slicer";
   spec.options = {{"--quote", "CSV", "write material and cost per part as CSV (one directory)", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""},
-                  {"--quick", "", "check sizes and hashes only, without decoding images", "", ""},
+                  {"--machine", "NAME|FILE", "extrusion printer whose limits G-code must keep", "", ""},
+                  {"--material", "NAME|FILE", "its material, with a melt rate", "", ""},
+                  {"--filament", "MM", "filament diameter; default: as the file states, else 1.75", "", ""},
+                  {"--model", "FILE", "part of a G-code file: volumes and outlines by layer", "", ""},
+                  {"--parts", "DIR", "folder or file of parts, to plan the job again; repeatable", "", ""},
+                  {"--quick", "", "check sizes and hashes only, without images or a replay", "", ""},
                   {"--memory", "SIZE", "memory limit for layers in flight: 256M, 1G", "1G", ""},
                   {"--json", "", "print one JSON object per directory on stdout", "", ""},
                   {"--quiet", "", "print faults only", "", ""}};
@@ -33,6 +41,7 @@ CommandSpec verify_spec() {
       "Examples:\n"
       "  lamina verify out\n"
       "  lamina verify out --quote quote.csv      what it took, from what the files make the machine do\n"
+      "  lamina verify part.gcode --machine marlin\n"
       "  lamina verify --quick --json out | jq .fault_count";
   return spec;
 }
@@ -47,11 +56,31 @@ Json report_json(const VerifyReport& report) {
   Json json = {{"command", "verify"},   {"directory", report.directory},     {"ok", report.ok()}, {"layers", report.layers},
                {"bytes", report.bytes}, {"fault_count", report.fault_count}, {"faults", faults}};
   if (!report.machine.empty()) json["replay"] = replay::totals_json(totals_of(report));
+  if (report.toolpaths) json["toolpaths"] = report.toolpaths->json();
   if (const Json* use = report.use.facts.find("use")) json["use"] = *use;
   for (const UnfedPowder& powder : report.unfed) {
     json["unfed"].push_back({{"material", powder.name}, {"pixels", powder.pixels}, {"layers", powder.layers}});
   }
   return json;
+}
+
+/// errors  kUsage: options of G-code files with a directory
+Status check_toolpath_options(const Arguments& arguments) {
+  std::error_code ignored;
+  for (const std::string& operand : arguments.operands) {
+    if (!std::filesystem::is_directory(operand, ignored)) continue;
+    for (const char* option : {"--machine", "--material", "--filament", "--model", "--parts"}) {
+      if (arguments.has(option)) return at_option(option, "is of G-code files, and " + operand + " is a directory");
+    }
+  }
+  if (arguments.has("--material") && !arguments.has("--machine")) return at_option("--material", "needs --machine");
+  return {};
+}
+
+/// The sums of a replayed G-code file, also of one with faults.
+void say_toolpaths(const VerifyReport& report, Answer& answer) {
+  if (!report.toolpaths) return;
+  for (const auto& [name, what] : report.toolpaths->lines()) answer.say(fmt::format("{:<10}{}", name, what));
 }
 
 Outcome run_verify(const Arguments& arguments, Context& context) {
@@ -62,8 +91,18 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
     return at_option("--quote", "needs the replay of programs; remove --quick");
   if (Status status = check_quote(arguments, arguments.operands.front()); !status) return status;
   if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
-  VerifyOptions options{.quick = arguments.has("--quick")};
+  if (Status status = check_toolpath_options(arguments); !status) return status;
+  VerifyOptions options;
+  options.quick = arguments.has("--quick");
   if (Status status = arguments.read("--memory", read_bytes, options.memory_bytes); !status) return status;
+  options.toolpaths.machine = arguments.text("--machine");
+  options.toolpaths.model = arguments.text("--model");
+  options.toolpaths.parts = arguments.all("--parts");
+  options.toolpaths.material = arguments.text("--material");
+  std::string (*const read_diameter)(std::string_view, double&) = [](std::string_view text, double& mm) {
+    return read_number(text, 0.5, 10, " mm", mm);
+  };
+  if (Status status = arguments.read("--filament", read_diameter, options.toolpaths.filament_mm); !status) return status;
   int code = 0;
   Answer answer(arguments, context);
   for (const std::string& directory : arguments.operands) {
@@ -80,8 +119,8 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
     }
     if (!report->ok()) code = std::max(code, static_cast<int>(Fault::kVerification));
     if (report->ok()) {
-      answer.say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
-                             readable_bytes(report->bytes)));
+      answer.say(fmt::format("{}: {} layers, {}, {}", directory, readable_count(report->layers), readable_bytes(report->bytes),
+                             report->recorded ? "all as the manifest says" : "no fault"));
       if (report->replayed > 0) {
         for (const std::string& line : replay::totals_text(totals_of(*report))) answer.say(line);
         for (const auto& [name, what] : report->use.results)
@@ -90,8 +129,9 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
         for (const UnfedPowder& powder : report->unfed) checks::warn_of_unfed(powder, warnings);
         for (const Warning& warning : warnings) answer.say("warning   " + one_line(warning.text));
       }
-      if (Status status = answer.status(); !status) return status;
     }
+    say_toolpaths(*report, answer);
+    if (Status status = answer.status(); !status) return status;
     if (report->ok()) {
       if (Status status = write_quote(arguments, report->use.quote); !status) return status;
     }

@@ -266,8 +266,9 @@ bool GcodeCommands::next(std::optional<RawBead>& bead) {
       if (run_command(bead)) return true;
     } else if (!read_line()) {
       return false;
-    } else if (text_.starts_with(';') && read_tag()) {
-      return true;
+    } else if (text_.starts_with(';')) {
+      if (observer_ != nullptr) observer_->on_comment(text_);
+      if (read_tag()) return true;
     }
   }
   return false;
@@ -432,9 +433,10 @@ bool takes_text(double code) {
 }  // namespace
 
 /// What follows a command that changes nothing here: RepRapFirmware runs the next G or M of the line (StringParser::FindParameters).
-bool GcodeCommands::pass_over(WordScanner scanner) {
+bool GcodeCommands::pass_over(WordScanner scanner, char letter, double code) {
   GcodeWords words;
   if (read_words(scanner, words, true) && !commands_.empty()) differ(Difference::kSeveral);
+  if (observer_ != nullptr) observer_->on_command(letter, code, words);
   return false;
 }
 
@@ -454,20 +456,25 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     commands_ = {};
     return false;
   }
+  const std::string_view command = commands_;
+  const auto pass_text = [&] {
+    if (observer_ != nullptr) observer_->on_text(command);
+    return false;
+  };
   WordScanner scanner(std::exchange(commands_, {}));
   bool found = scanner.next();
   if (found && scanner.letter() == 'N') found = scanner.next();  // behind a line's number
-  if (!found) return false;
+  if (!found) return pass_text();
   char letter = scanner.letter();
   double code = scanner.value();
   const bool repeats = letter == 'E' || letter == 'F' || (letter >= 'X' && letter <= 'Z');
-  if (!scanner.has_number() || (!repeats && letter != 'G' && letter != 'M' && letter != 'T')) return false;
+  if (!scanner.has_number() || (!repeats && letter != 'G' && letter != 'M' && letter != 'T')) return pass_text();
   if (letter == 'T') {
     change_tool(code);
-    return pass_over(scanner);
+    return pass_over(scanner, letter, code);
   }
   if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 204 && code != 221)
-    return !takes_text(code) && pass_over(scanner);
+    return !takes_text(code) && pass_over(scanner, letter, code);
   if (repeats) {
     if (position_.motion > 3) return false;
     const std::uint32_t before = scanner.differences | bit_of(Difference::kRepeat);
@@ -487,6 +494,7 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
   if (moves) position_.motion = static_cast<std::uint8_t>(code);
   if (moves || (letter == 'G' && code == 92)) return move(code, words, bead);
   set_mode(letter, code, words);
+  if (observer_ != nullptr) observer_->on_command(letter, code, words);
   return false;
 }
 
@@ -552,6 +560,7 @@ bool GcodeCommands::move(double code, const GcodeWords& words, std::optional<Raw
     if (words.has('E') && !spot) count_unfed(words, fed);
     const bool arc = code == 2 || code == 3;
     if (arc && !begin_arc(code == 2, words, to, fed)) return false;
+    if (observer_ != nullptr && chord_ == 0) observer_->on_move({at, to, fed, words.has('F')});
     if (!arc && fed > 0 && (to[0] != at[0] || to[1] != at[1])) {
       deposit({{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, position_.volumetric, position_.speed, false, 0, true}, bead);
     } else if (chord_ == 0) {
@@ -609,6 +618,7 @@ bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
                 true};
   // Also while what was retracted is fed again: beyond the bed an arc may have any number of chords.
   if (!within_reach(piece)) return false;
+  if (observer_ != nullptr) observer_->on_move({piece.from, piece.to, piece.fed, false});
   chord_ = chord_ < arc_.chords() ? chord_ + 1 : 0;
   return (from.x != to.x || from.y != to.y) && deposit(piece, bead);
 }

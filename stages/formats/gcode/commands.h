@@ -97,6 +97,9 @@ class Arc {
   std::uint64_t chords_ = 1;
 };
 
+/// Opens a file to read commands from. errors  kUsage: cannot be read, or is binary G-code or an archive
+Result<FileReader> open_gcode(const std::string& path);
+
 /// A straight move, or a chord of an arc, that extrudes filament; mm.
 struct RawBead {
   double from[3], to[3];
@@ -116,11 +119,35 @@ struct OddLines {
   void add(std::uint64_t at) { line = count++ == 0 ? at : line; }
 };
 
+/// A move as it is commanded, or a chord of an arc that deposits; mm, and mm of filament or mm3 (GcodeFile::FilePosition).
+struct GcodeMove {
+  const double* from;  // x, y, z
+  const double* to;
+  double fed;  // with M221; below 0: drawn back
+  bool states_feed_rate;
+};
+
+/// Receives all that a file commands, in its order, before GcodeCommands::next() returns the bead of it. Names and numbers of commands
+/// that GcodeCommands itself does not run come as they are.
+class CommandObserver {
+ public:
+  virtual ~CommandObserver() = default;
+  virtual void on_move(const GcodeMove& move) = 0;
+  /// G and M commands other than moves, and T with the number of a tool as its code. Not of those that take text.
+  virtual void on_command(char letter, double code, const GcodeWords& words) = 0;
+  /// A command without a letter and a number: a macro of Klipper.
+  virtual void on_text(std::string_view command) = 0;
+  /// A line that begins with a semicolon.
+  virtual void on_comment(std::string_view comment) = 0;
+};
+
 class GcodeCommands {
  public:
   using FilePosition = GcodeFile::FilePosition;
 
   GcodeCommands(FileReader& file, std::vector<std::string>& types) : path_(file.path()), types_(types), file_(file) {}
+  /// Reports to an observer, which must outlive this.
+  void report_to(CommandObserver& observer) { observer_ = &observer; }
 
   void go_to(const FilePosition& position) {
     position_ = position;
@@ -156,7 +183,7 @@ class GcodeCommands {
   void set_flow(const GcodeWords& words);
   void differ_by_tool();
   void change_tool(double number);
-  bool pass_over(WordScanner scanner);
+  bool pass_over(WordScanner scanner, char letter, double code);
   void set_acceleration(double mm_s2);
   bool feeds_relative() const;
   void differ(Difference difference) { differences[static_cast<std::size_t>(difference)].add(position_.line); }
@@ -171,6 +198,7 @@ class GcodeCommands {
   const std::string& path_;
   std::vector<std::string>& types_;
   FileReader& file_;
+  CommandObserver* observer_ = nullptr;
   std::string_view text_, commands_;  // the line, and what of it is not run yet
   std::string stripped_;
   bool parentheses_ = false;  // of the line

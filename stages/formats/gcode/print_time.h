@@ -27,6 +27,9 @@ class PrintTime {
   /// speed_mm_s  of the head, or of the filament if it moves alone; > 0
   /// cost        O(1); moves wait in an array until kMoves of them are planned
   void move(const Delta& delta_mm, double speed_mm_s);
+  /// The acceleration of moves that follow, mm/s2, and the speed that corners change at once, mm/s; both > 0.
+  void set_limits(double acceleration_mm_s2, double corner_mm_s) { acceleration_ = acceleration_mm_s2, corner_ = corner_mm_s; }
+  double corner_mm_s() const { return corner_; }
   /// Halts the machine. returns  seconds of all moves so far
   double halt();
 

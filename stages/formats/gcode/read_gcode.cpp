@@ -468,6 +468,14 @@ Result<GcodeFile> GcodeSurvey::run() {
   return std::move(file_);
 }
 
+Result<FileReader> open_gcode(const std::string& path) {
+  auto reader = FileReader::open(path, kRules);
+  if (!reader) return reader;
+  if (const std::string_view kind = binary_kind(*reader); !kind.empty())
+    return Error{Fault::kUsage, fmt::format("{}: {}", path, kind)};
+  return reader;
+}
+
 Result<GcodeFile> GcodeFile::open(const std::string& path, const GcodeOptions& options) {
   auto reader = FileReader::open(path, kRules);
   return reader ? read(*reader, options) : Result<GcodeFile>(reader.error());
