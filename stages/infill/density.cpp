@@ -222,9 +222,10 @@ double solid_pitch(const FillParameters& parameters, Nm width, Nm thickness) {
 
 namespace {
 
-GapWidths gap_widths(const FillParameters& parameters, Nm width, Nm thickness) {
-  const double pitch = solid_pitch(parameters, width, thickness);
-  return {static_cast<Nm>(pitch), min_gap(pitch)};
+/// Of gaps between walls: two of them have room in wider ones.
+GapWidths gap_widths(const FillParameters& parameters, Nm thickness) {
+  const double pitch = solid_pitch(parameters, parameters.wall_width, thickness);
+  return {static_cast<Nm>(2 * pitch), min_gap(pitch)};
 }
 
 /// Where the centres of solid lines are.
@@ -235,17 +236,47 @@ Status inset_solid(const FillContext& context, const FillParameters& parameters,
   return {};
 }
 
-/// Lines where the part is thinner than a wall, and what is too thin for them. wall  the first one
-Status add_thin_walls(const ContoursView& contours, const Contours& wall, Nm width, Nm minimum, Outlines& outlines) {
-  auto thin = narrow_part(contours, wall, width / 2);
-  if (!thin) return thin.error();
-  if (thin->size() == 0 && contours.size() <= wall.size()) return {};
-  auto lines = gap_lines(std::move(*thin), {width, minimum});
+/// Opposite beads of walls may be so near, in pitches: they overlap by a fifth at most.
+constexpr double kNearestWalls = 0.8;
+
+/// A wall of a region, and what of the region has no room for the wall on both sides.
+struct WallOf {
+  Contours centres, narrow;
+  std::int64_t half;  // of the width of what is narrow, at most
+};
+/// inwards  of the centres from the edge
+Result<WallOf> wall_of(const ContoursView& region, std::int64_t inwards, double pitch) {
+  const std::int64_t apart = std::llround(kNearestWalls * pitch / 2), half = inwards + apart;
+  const auto inset = offset_contours(region, -half);
+  auto centres = inset ? offset_contours(*inset, apart) : inset;
+  auto narrow = centres ? narrow_part(region, *inset, half) : centres;
+  if (!narrow) return narrow.error();
+  return WallOf{std::move(*centres), std::move(*narrow), half};
+}
+
+/// Lines where the part is thinner than two walls, and what is too thin for them.
+Status add_thin_walls(const ContoursView& contours, const WallOf& wall, Nm minimum, Outlines& outlines) {
+  if (wall.narrow.size() == 0 && contours.size() <= wall.centres.size()) return {};
+  auto lines = gap_lines(wall.narrow, {static_cast<Nm>(2 * wall.half), minimum});
   if (!lines) return lines.error();
   outlines.thin_walls = std::move(*lines);
-  const Contours bare = bare_islands(contours, width, {&wall, &outlines.thin_walls.lines});
+  const Contours bare = bare_islands(contours, static_cast<Nm>(2 * wall.half), {&wall.centres, &outlines.thin_walls.lines});
   outlines.lost = add_dots(bare, minimum, outlines.thin_walls);
   outlines.lost.append(narrow_features(outlines.thin_walls.left, minimum));
+  return {};
+}
+
+/// Moves what is narrower than two sparse lines from what is inside the walls to the gaps. errors  kInternal of Clipper
+Status take_narrow(double pitch, Contours& inside, Outlines& outlines) {
+  const std::int64_t half = std::llround(pitch);
+  const auto inset = offset_contours(inside, -half);
+  const auto narrow = inset ? narrow_part(inside, *inset, half) : inset;
+  if (!narrow) return narrow.error();
+  if (narrow->size() == 0) return {};
+  auto rest = subtract_contours(inside, *narrow, false);
+  if (!rest) return rest.error();
+  inside = std::move(*rest);
+  outlines.gaps.append(*narrow);
   return {};
 }
 
@@ -259,29 +290,30 @@ Result<Outlines> outlines_by_density(const ContoursView& contours, const FillCon
   Contours inside;
   for (std::uint32_t wall = 0; wall < parameters.walls; ++wall) {
     const ContoursView around = wall == 0 ? contours : ContoursView(inside);
-    const std::int64_t inwards = wall == 0 ? parameters.wall_width / 2 : half(pitch);
-    auto centres = offset_contours(around, -inwards);
-    if (!centres) return centres.error();
+    auto of = wall_of(around, wall == 0 ? parameters.wall_width / 2 : half(pitch), pitch);
+    if (!of) return of.error();
     if (wall == 0) {
-      if (Status status = add_thin_walls(around, *centres, parameters.wall_width, min_gap(pitch), made); !status)
-        return status.error();
+      if (Status status = add_thin_walls(around, *of, min_gap(pitch), made); !status) return status.error();
     } else {
-      const auto narrow = narrow_part(around, *centres, inwards);
-      if (!narrow) return narrow.error();
-      made.gaps.append(*narrow);
+      made.gaps.append(of->narrow);
     }
-    auto next = offset_contours(*centres, -half(pitch));
+    auto next = offset_contours(of->centres, -half(pitch));
     if (!next) return next.error();
     inside = std::move(*next);
-    if (centres->size() == 0) break;
-    made.walls.push_back(std::move(*centres));
+    if (of->centres.size() == 0) break;
+    made.walls.push_back(std::move(of->centres));
     merge_short_edges(made.walls.back(), kShortestEdge, context.tolerance, scratch);
   }
-  Contours& all = *parameters.density >= 1 ? made.solid : made.region;
-  if (parameters.walls == 0) inside.append(contours);
+  const bool solid = *parameters.density >= 1;
+  if (parameters.walls == 0) {
+    inside.append(contours);
+  } else if (!solid) {
+    if (Status status = take_narrow(pitch, inside, made); !status) return status.error();
+  }
+  Contours& all = solid ? made.solid : made.region;
   all = std::move(inside);
   merge_short_edges(all, kShortestEdge, context.tolerance, scratch);
-  if (*parameters.density >= 1) {
+  if (solid) {
     if (Status status = inset_solid(context, parameters, made); !status) return status.error();
   }
   return made;
@@ -344,7 +376,7 @@ Status append_by_density(const Outlines& outlines, const FillContext& context, c
   const Nm thickness = context.layer.thickness;
   append_gap_lines(outlines.thin_walls, mm(thickness), parameters.shape, PathKind::kOuter, out);
   if (outlines.gaps.size() > 0) {
-    const auto lines = gap_lines(outlines.gaps, gap_widths(parameters, parameters.wall_width, thickness));
+    const auto lines = gap_lines(outlines.gaps, gap_widths(parameters, thickness));
     if (!lines) return lines.error();
     append_gap_lines(*lines, mm(thickness), parameters.shape, PathKind::kSolid, out);
   }
@@ -374,7 +406,7 @@ FillBound bound_by_density(const Outlines& outlines, const FillContext& context,
   };
   const Nm thickness = context.layer.thickness;
   bound_gaps(outlines.thin_walls.lines.point.size(), bound);
-  bound_gaps(bound_gap_points(outlines.gaps, gap_widths(parameters, parameters.wall_width, thickness)), bound);
+  bound_gaps(bound_gap_points(outlines.gaps, gap_widths(parameters, thickness)), bound);
   if (outlines.solid.size() > 0) {
     const SolidBound solid = bound_solid(outlines, context, parameters);
     add(solid.crossings, outlines.solid_centres.point.size());

@@ -18,6 +18,63 @@ constexpr double kNarrower = 5.0 / 6;            // half widths at most so far a
 constexpr std::int64_t kLineTolerance = 5'000;   // nm by which a line may cut its corners
 constexpr std::int64_t kShortestLine = 200'000;  // nm: a line that is shorter is the end of a bead of its own
 
+/// Calls use(contours) for each outer contour with its holes, as a range of numbers.
+template <class Use>
+void for_each_island(const ContoursView& region, Use use) {
+  for (std::uint32_t first = 0, end = 0; first < region.size(); first = end) {
+    end = first + 1;
+    while (end < region.size() && doubled_area(region[end]) < 0) ++end;
+    double area = 0;
+    for (std::uint32_t c = first; c < end; ++c) area += square_mm(doubled_area(region[c]));
+    use(first, end, area * 1e12);
+  }
+}
+
+struct IslandBox {
+  Point2 lo, hi;
+  explicit IslandBox(std::span<const Point2> outer) : lo(outer.front()), hi(outer.front()) {
+    for (const Point2 p : outer) {
+      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
+      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
+    }
+  }
+  bool contains(Point2 p) const { return p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y; }
+};
+
+void append_range(const ContoursView& from, std::uint32_t first, std::uint32_t end, Contours& to) {
+  for (std::uint32_t c = first; c < end; ++c) {
+    to.point.insert(to.point.end(), from[c].begin(), from[c].end());
+    to.close();
+  }
+}
+
+/// Points by square cells, for searches in boxes of a few cells.
+class PointCells {
+ public:
+  PointCells(std::initializer_list<const Contours*> lines, Nm cell) : cell_(cell) {
+    for (const Contours* each : lines) {
+      for (const Point2 p : each->point)
+        cells_[key(floor_div<std::int64_t>(p.x, cell), floor_div<std::int64_t>(p.y, cell))].push_back(p);
+    }
+  }
+  bool any_in(const IslandBox& box) const {
+    for (std::int64_t i = floor_div<std::int64_t>(box.lo.x, cell_); i <= floor_div<std::int64_t>(box.hi.x, cell_); ++i) {
+      for (std::int64_t j = floor_div<std::int64_t>(box.lo.y, cell_); j <= floor_div<std::int64_t>(box.hi.y, cell_); ++j) {
+        const auto found = cells_.find(key(i, j));
+        if (found != cells_.end() && std::ranges::any_of(found->second, [&](Point2 p) { return box.contains(p); })) return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  static std::uint64_t key(std::int64_t i, std::int64_t j) {
+    return std::uint64_t{static_cast<std::uint32_t>(i)} << 32 | static_cast<std::uint32_t>(j);
+  }
+  std::int64_t cell_;
+  std::unordered_map<std::uint64_t, std::vector<Point2>> cells_;
+};
+
 /// Numbered points by square cells as wide as the reach of a search.
 class PointGrid {
  public:
@@ -260,49 +317,13 @@ Result<Contours> narrow_part(const ContoursView& region, const ContoursView& ins
   return subtract_contours(region, *wide, false);
 }
 
-namespace {
-
-/// Calls use(contours) for each outer contour with its holes, as a range of numbers.
-template <class Use>
-void for_each_island(const ContoursView& region, Use use) {
-  for (std::uint32_t first = 0, end = 0; first < region.size(); first = end) {
-    end = first + 1;
-    while (end < region.size() && doubled_area(region[end]) < 0) ++end;
-    double area = 0;
-    for (std::uint32_t c = first; c < end; ++c) area += square_mm(doubled_area(region[c]));
-    use(first, end, area * 1e12);
-  }
-}
-
-struct IslandBox {
-  Point2 lo, hi;
-  explicit IslandBox(std::span<const Point2> outer) : lo(outer.front()), hi(outer.front()) {
-    for (const Point2 p : outer) {
-      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
-      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
-    }
-  }
-  bool contains(Point2 p) const { return p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y; }
-};
-
-void append_range(const ContoursView& from, std::uint32_t first, std::uint32_t end, Contours& to) {
-  for (std::uint32_t c = first; c < end; ++c) {
-    to.point.insert(to.point.end(), from[c].begin(), from[c].end());
-    to.close();
-  }
-}
-
-}  // namespace
-
 Contours bare_islands(const ContoursView& contours, Nm width, std::initializer_list<const Contours*> deposited) {
   Contours bare;
+  std::optional<PointCells> beads;  // made for the first small island
   for_each_island(contours, [&](std::uint32_t first, std::uint32_t end, double area) {
     if (area > 2 * static_cast<double>(width) * width) return;
-    const IslandBox box(contours[first]);
-    const auto has_bead = [&](const Contours* lines) {
-      return std::ranges::any_of(lines->point, [&](Point2 p) { return box.contains(p); });
-    };
-    if (std::ranges::none_of(deposited, has_bead)) append_range(contours, first, end, bare);
+    if (!beads) beads.emplace(deposited, width);
+    if (!beads->any_in(IslandBox(contours[first]))) append_range(contours, first, end, bare);
   });
   return bare;
 }
@@ -316,17 +337,17 @@ Contours narrow_features(const ContoursView& narrow, Nm width) {
 }
 
 Contours add_dots(const ContoursView& islands, Nm minimum, GapLines& lines) {
-  constexpr Nm kDot = 100'000;
   Contours left;
   for_each_island(islands, [&](std::uint32_t first, std::uint32_t end, double area) {
     const IslandBox box(islands[first]);
     const Nm width = box.hi.x - box.lo.x, depth = box.hi.y - box.lo.y;
     if (std::min(width, depth) < minimum) return append_range(islands, first, end, left);
     const Point2 middle{box.lo.x + width / 2, box.lo.y + depth / 2};
-    const Nm along_x = width >= depth ? kDot / 2 : 0, along_y = kDot / 2 - along_x;
+    const Nm half = static_cast<Nm>(std::llround(std::sqrt(area) / 4));  // of the line: the bead is round
+    const Nm along_x = width >= depth ? half : 0, along_y = half - along_x;
     for (const Nm side : {-1, 1}) {
       lines.lines.point.push_back({middle.x + side * along_x, middle.y + side * along_y});
-      lines.gap.push_back(static_cast<Nm>(std::llround(area / kDot)));
+      lines.gap.push_back(static_cast<Nm>(std::llround(area / (2.0 * half))));
     }
     lines.lines.close();
   });
@@ -346,8 +367,45 @@ std::uint64_t bound_gap_points(const ContoursView& region, const GapWidths& widt
   return static_cast<std::uint64_t>(length / step) + 4 * region.point.size();
 }
 
-Result<GapLines> gap_lines(Contours region, const GapWidths& widths) {
+namespace {
+
+/// Without pieces that no line fits into: their area is below that of the shortest one, or their mean width far below the
+/// minimum.
+Contours without_specks(const ContoursView& region, Nm minimum) {
+  Contours kept;
+  for_each_island(region, [&](std::uint32_t first, std::uint32_t end, double area) {
+    if (area < static_cast<double>(kShortestLine) * minimum) return;
+    double edge = 0;
+    for (std::uint32_t c = first; c < end; ++c) {
+      Point2 last = region[c].back();
+      for (const Point2 p : region[c]) edge += distance(std::exchange(last, p), p);
+    }
+    if (2 * area >= 0.3 * minimum * edge) append_range(region, first, end, kept);
+  });
+  return kept;
+}
+
+}  // namespace
+
+namespace {
+
+/// Pieces that are too short for a line, and more than a corner: they get a dot.
+void add_compact(const ContoursView& narrow, const GapWidths& widths, GapLines& lines) {
+  Contours compact;
+  for_each_island(narrow, [&](std::uint32_t first, std::uint32_t end, double area) {
+    const IslandBox box(narrow[first]);
+    const double around = (static_cast<double>(box.hi.x) - box.lo.x) * (static_cast<double>(box.hi.y) - box.lo.y);
+    const double whole = static_cast<double>(widths.maximum) * widths.maximum;
+    if (area >= whole / 8 && area <= whole && area >= around / 2) append_range(narrow, first, end, compact);
+  });
+  if (compact.size() > 0) add_dots(bare_islands(compact, widths.maximum, {&lines.lines}), widths.minimum, lines);
+}
+
+}  // namespace
+
+Result<GapLines> gap_lines(const ContoursView& narrow, const GapWidths& widths) {
   GapLines made;
+  Contours region = without_specks(narrow, widths.minimum);
   std::vector<CentreLine> lines;
   const std::vector<double> half = half_widths(widths);
   for (std::size_t i = 1; i < half.size() && region.size() > 0; ++i) {
@@ -365,6 +423,7 @@ Result<GapLines> gap_lines(Contours region, const GapWidths& widths) {
   made.left = std::move(region);
   // The strip of a smaller half width begins the sum of both further on.
   LineJoiner(lines, widths.maximum).for_each_chain(ChainCollector(made));
+  add_compact(narrow, widths, made);
   return made;
 }
 

@@ -35,7 +35,7 @@ struct GapWidths {
 struct GapLines {
   Contours lines;
   Buffer<Nm> gap;  // nm of the region there, of each point: of the line from it to the next one
-  Contours left;   // narrower than the minimum
+  Contours left;   // narrower than the minimum, but for specks
 
   std::uint64_t bytes() const;
 };
@@ -54,7 +54,8 @@ Contours bare_islands(const ContoursView& contours, Nm width, std::initializer_l
 /// Pieces of what is narrower than `width` that are more than the tip of a corner.
 Contours narrow_features(const ContoursView& narrow, Nm width);
 
-/// Adds a line of 0.1 mm for each island that is wider and deeper than `minimum`, with its area; returns the others.
+/// Adds a line half as long as the root of its area for each island that is wider and deeper than `minimum`, with its area;
+/// returns the others.
 Contours add_dots(const ContoursView& islands, Nm minimum, GapLines& lines);
 
 /// Upper bound of the points of lines in narrow regions.
@@ -62,7 +63,7 @@ std::uint64_t bound_gap_points(const ContoursView& region, const GapWidths& widt
 
 /// errors  kInternal of Clipper
 /// cost    O((P + L / h) log P) of regions with P points and an edge of length L, for widths down to h
-Result<GapLines> gap_lines(Contours region, const GapWidths& widths);
+Result<GapLines> gap_lines(const ContoursView& narrow, const GapWidths& widths);
 
 /// Appends lines as beads of the volume of their gap. height  mm of the layer
 void append_gap_lines(const GapLines& lines, double height_mm, BeadShape shape, PathKind kind, Toolpaths& out);

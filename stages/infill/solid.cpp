@@ -136,7 +136,7 @@ Status append_rest(const ContoursView& solid, const CoveredArea& covered, double
   // In the frame few beads are next to each other along a scan line of Clipper.
   auto rest = subtract_contours(frame.to(solid), covered.area(), false);
   if (!rest) return rest.error();
-  auto lines = gap_lines(std::move(*rest), {static_cast<Nm>(2 * pitch), min_gap(pitch)});
+  auto lines = gap_lines(*rest, {static_cast<Nm>(2 * pitch), min_gap(pitch)});
   if (!lines) return lines.error();
   for (Point2& p : lines->lines.point) p = frame.from(p);
   append_gap_lines(*lines, height_mm, parameters.shape, PathKind::kSolid, out);

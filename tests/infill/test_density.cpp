@@ -88,6 +88,21 @@ TEST(Density, OfAHundredIsTheVolumeAtAnyAngleAndNumberOfWalls) {
   }
 }
 
+// Walls of opposite sides are no nearer than four fifths of a pitch; a single bead fills what is narrower. Gaps below a quarter
+// of a pitch stay: the rib of 0.8 mm has one of 0.04 mm, and loses what two stadia lack of their rectangles.
+TEST(Density, OfARibIsItsVolumeForAnyWidth) {
+  for (double width = 0.2; width < 2.5; width += 0.05) {
+    const Contours rib = contours_of({{{0, 0}, {width, 0}, {width, 20}, {0, 20}}});
+    for (const double density : {0.2, 1.0}) {
+      if (density < 1 && width > 2) continue;
+      const Toolpaths paths = filled(rib, context_of(rib), by_density(Pattern::kGrid, density, 2));
+      const double share = volume_of(paths, 200'000) / (width * 20 * 0.2);
+      EXPECT_GT(share, 0.88) << width << " mm, " << density;
+      EXPECT_LT(share, 1.08) << width << " mm, " << density;
+    }
+  }
+}
+
 TEST(Density, BeadsStayInsideAndWithinTheirBoundForAnyOutline) {
   for (const Outline& outline : outlines()) {
     for (const Pattern pattern : {Pattern::kRaster, Pattern::kLines, Pattern::kGrid, Pattern::kGyroid}) {

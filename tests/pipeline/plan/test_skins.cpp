@@ -107,7 +107,7 @@ struct Coverage {
 };
 
 /// Marks what walls and solid lines of a layer reach.
-void mark_beads(const Sections& sections, std::uint32_t k, double reach, CellGrid& beads) {
+void mark_beads(const Sections& sections, std::uint32_t k, Nm cell, CellGrid& beads) {
   Sections::Work work;
   EXPECT_TRUE(sections.layer(k, work).ok());
   beads.clear();
@@ -115,7 +115,7 @@ void mark_beads(const Sections& sections, std::uint32_t k, double reach, CellGri
     for (std::uint32_t i = work.paths.offset[p]; i + 1 < work.paths.offset[p + 1]; ++i) {
       const PathKind kind = work.paths.kind[i];
       if (kind == PathKind::kOuter || kind == PathKind::kInner || kind == PathKind::kSolid) {
-        beads.mark(work.paths.point[i], work.paths.point[i + 1], reach);
+        beads.mark(work.paths.point[i], work.paths.point[i + 1], work.paths.width[i] / std::sqrt(2.0) + cell / 4.0);
       }
     }
   }
@@ -138,7 +138,6 @@ Coverage coverage_of(const std::string& path, double layer_mm, const std::vector
   const Sections& sections = *plan->sections;
   CellGrid beads(sections.bounds(), cell);
   const auto count = static_cast<std::uint32_t>(sections.layers().size());
-  const double reach = 400'000 / std::sqrt(2.0) + cell / 4.0;
   CellGrid last(sections.bounds(), cell), over(sections.bounds(), cell);  // layers k - 1 and k + 1
   for (std::uint32_t k = 0; k < count; ++k) {
     const auto mask_of = [&](std::uint32_t layer) {
@@ -160,7 +159,7 @@ Coverage coverage_of(const std::string& path, double layer_mm, const std::vector
       for (std::int64_t i = 0; i < beads.columns(); ++i) faces += is_face(i, j) ? 1 : 0;
     }
     found.faces += faces;
-    if (faces > 0) mark_beads(sections, k, reach, beads);
+    if (faces > 0) mark_beads(sections, k, cell, beads);
     for (std::int64_t j = 0; faces > 0 && j < beads.rows(); ++j) {
       for (std::int64_t i = 0; i < beads.columns(); ++i) {
         if (!is_face(i, j) || beads.at(i, j) != 0) continue;
