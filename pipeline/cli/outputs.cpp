@@ -32,6 +32,7 @@ constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--measured", "the measurements"},
                                    {"--measure", "a measured table"},
                                    {"--parts", "a part"},
+                                   {"--model", "the model"},
                                    {"--scan", "a scan"},
                                    {"--chart", "the chart"},
                                    {"--import", "the profile"}};

@@ -1,6 +1,8 @@
 #include "pipeline/output/print_objects.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <map>
 #include <set>
 #include <string>
 
@@ -22,10 +24,12 @@ std::string plain_name(const std::string& file) {
 std::vector<formats::ExtrusionObject> print_objects(const Sections& sections) {
   std::vector<formats::ExtrusionObject> objects;
   std::set<std::string> used;
+  std::map<std::string, std::uint32_t> last;  // number of each base
   for (const std::string& file : sections.names()) {
     const std::string base = plain_name(file);
     std::string name = base;
-    for (int number = 2; !used.insert(name).second; ++number) name = base + "_" + std::to_string(number);
+    std::uint32_t& number = last.try_emplace(base, 1).first->second;
+    while (!used.insert(name).second) name = base + "_" + std::to_string(++number);
     objects.push_back({name, {INT64_MAX, INT64_MAX}, {INT64_MIN, INT64_MIN}});
   }
   for (const Sections::Area& area : sections.areas()) {

@@ -329,7 +329,8 @@ class Planner {
   /// Lines at gap 0 touch, but their round sides leave a void.
   void warn_of_touching_lines() {
     if (plan_.segments->any()) return;
-    const double height = mm(plan_.sections->layers().front().layer.thickness);
+    const auto& layers = plan_.sections->layers();  // the first one may have a thickness of its own
+    const double height = mm(layers[std::min<std::size_t>(1, layers.size() - 1)].layer.thickness);
     double largest = 0.05;
     const auto consider = [&](const infill::FillParameters& fill) {
       const auto distance = infill::touching_distance(fill);

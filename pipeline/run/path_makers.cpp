@@ -60,7 +60,9 @@ Status deposit_around(const Plan& plan, const Layer& layer, const ContoursView& 
   infill::FillParameters parameters;
   parameters.shape = machine.material.shape();
   const double pitch = infill::solid_pitch(parameters, width, layer.thickness);
-  const auto brim = infill::brim_around(contours, {reach, width, pitch, static_cast<Nm>(nm_of(request.elephant_foot_mm))}, bed);
+  const auto foot = static_cast<Nm>(nm_of(request.elephant_foot_mm));
+  const auto printed = infill::without_elephant_foot(contours, foot, width);
+  const auto brim = printed ? infill::brim_around(*printed, {reach, width, pitch}, bed) : printed;
   if (!brim) return brim.error();
   deposit_lines(plan, layer, *brim, width, out);
   return {};

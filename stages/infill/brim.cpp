@@ -40,8 +40,7 @@ Result<Contours> brim_around(const ContoursView& layer, const BrimSettings& sett
   std::vector<Contours> loops;
   auto region = contour_union(outer_contours(layer), FillRule::kNonzero);
   double at = 0;
-  for (double next = settings.pitch / 2 - settings.inset; region && next <= static_cast<double>(settings.reach);
-       next += settings.pitch) {
+  for (double next = settings.pitch / 2; region && next <= static_cast<double>(settings.reach); next += settings.pitch) {
     auto grown = offset_contours(*region, std::llround(next) - std::llround(at));
     if (grown) grown = contour_union(*grown, FillRule::kNonzero);
     region = std::move(grown);
@@ -75,8 +74,12 @@ Result<Contours> without_elephant_foot(const ContoursView& contours, Nm inset, N
   const auto narrow = centres ? narrow_part(contours, *centres, half) : centres;
   if (!narrow) return narrow.error();
   if (narrow->size() == 0) return moved;
+  constexpr Nm kOverlap = 10'000;  // nm: what stays as it is reaches what has moved
+  auto kept = offset_contours(*narrow, inset + kOverlap);
+  if (kept) kept = intersect_contours(*kept, contours, false);
+  if (!kept) return kept;
   Contours both = std::move(*moved);
-  both.append(*narrow);
+  both.append(*kept);
   return contour_union(both, FillRule::kNonzero);
 }
 

@@ -15,12 +15,14 @@ struct BrimSettings {
   std::int64_t reach;  // from the parts to the outer edge
   Nm width;            // of a bead
   double pitch;        // from loop to loop
-  Nm inset;            // of the parts' walls from the contours (elephant foot)
 };
 
 /// Closed loops around the outer contours of a layer, outermost first, each with its first point again at its end. Loops of
-/// parts that are near each other are one. Loops that leave the bed are open lines within it. layer   clean contours of all
-/// parts; holes get no brim bed     nm, from 0; beads are within it with their full width errors  kInternal of Clipper
+/// parts that are near each other are one. Loops that leave the bed are open lines within it.
+///
+/// layer   clean contours of all parts, without their elephant foot; holes get no brim
+/// bed     nm, from 0; beads are within it with their full width
+/// errors  kInternal of Clipper
 Result<Contours> brim_around(const ContoursView& layer, const BrimSettings& settings, std::array<std::int64_t, 2> bed);
 
 /// The region of a first layer, which the bed presses flat, moved inwards; not where less than a bead would stay of it.

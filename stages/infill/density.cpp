@@ -256,7 +256,6 @@ Result<WallOf> wall_of(const ContoursView& region, std::int64_t inwards, double 
 
 /// Lines where the part is thinner than two walls, and what is too thin for them.
 Status add_thin_walls(const ContoursView& contours, const WallOf& wall, Nm minimum, Outlines& outlines) {
-  if (wall.narrow.size() == 0 && contours.size() <= wall.centres.size()) return {};
   auto lines = gap_lines(wall.narrow, {static_cast<Nm>(2 * wall.half), minimum});
   if (!lines) return lines.error();
   outlines.thin_walls = std::move(*lines);

@@ -178,10 +178,8 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
     if (wall == 0) {
       const auto thin = narrow_part(contours, *moved, parameters.wall_width / 2);
       if (!thin) return thin.error();
-      if (thin->size() > 0) {
-        made.lost = bare_islands(contours, parameters.wall_width, {&*moved});
-        made.lost.append(narrow_features(*thin, parameters.wall_width));
-      }
+      made.lost = bare_islands(contours, parameters.wall_width, {&*moved});
+      made.lost.append(narrow_features(*thin, parameters.wall_width));
     }
     if (moved->size() == 0) break;  // and so are all further in
     innermost = std::move(*moved);

@@ -389,42 +389,70 @@ Contours without_specks(const ContoursView& region, Nm minimum) {
 
 namespace {
 
-/// Pieces that are too short for a line, and more than a corner: they get a dot.
-void add_compact(const ContoursView& narrow, const GapWidths& widths, GapLines& lines) {
-  Contours compact;
-  for_each_island(narrow, [&](std::uint32_t first, std::uint32_t end, double area) {
-    const IslandBox box(narrow[first]);
-    const double around = (static_cast<double>(box.hi.x) - box.lo.x) * (static_cast<double>(box.hi.y) - box.lo.y);
-    const double whole = static_cast<double>(widths.maximum) * widths.maximum;
-    if (area >= whole / 8 && area <= whole && area >= around / 2) append_range(narrow, first, end, compact);
-  });
-  if (compact.size() > 0) add_dots(bare_islands(compact, widths.maximum, {&lines.lines}), widths.minimum, lines);
+/// Widens lines by what their ends lack, so that they have the volume of the piece; as far as a bead spreads.
+void scale_to(double area, GapLines& lines, std::uint32_t first) {
+  constexpr double kWidest = 1.35;
+  double sum = 0;
+  for (std::uint32_t c = first; c < lines.lines.size(); ++c) {
+    for (std::uint32_t i = lines.lines.offset[c]; i + 1 < lines.lines.offset[c + 1]; ++i)
+      sum += distance(lines.lines.point[i], lines.lines.point[i + 1]) * lines.gap[i];
+  }
+  if (!(sum > 0)) return;
+  const double factor = std::clamp(area / sum, 1.0, kWidest);
+  for (std::uint32_t i = lines.lines.offset[first]; i < lines.gap.size(); ++i)
+    lines.gap[i] = static_cast<Nm>(std::llround(lines.gap[i] * factor));
+}
+
+/// A compact piece that is more than a corner.
+bool deserves_dot(const IslandBox& box, double area, const GapWidths& widths) {
+  const double around = (static_cast<double>(box.hi.x) - box.lo.x) * (static_cast<double>(box.hi.y) - box.lo.y);
+  const double whole = static_cast<double>(widths.maximum) * widths.maximum;
+  return area >= whole / 8 && area <= whole && area >= around / 2;
+}
+
+/// The lines of one connected piece.
+Status add_lines_of(Contours piece, const GapWidths& widths, const std::vector<double>& half, GapLines& made) {
+  const Contours whole = piece;
+  std::vector<CentreLine> lines;
+  for (std::size_t i = 1; i < half.size() && piece.size() > 0; ++i) {
+    const std::int64_t next = std::llround(half[i]);
+    const auto strips = offset_contours(piece, -next);
+    if (!strips) return strips.error();
+    if (strips->size() == 0) continue;
+    StripFollower follower(reach_of(half[i - 1], half[i]), static_cast<Nm>(std::llround(half[i - 1] + half[i])), lines);
+    for (std::uint32_t c = 0; c < strips->size(); ++c) follower.follow((*strips)[c]);
+    const auto covered = offset_contours(*strips, next);
+    auto rest = covered ? subtract_contours(piece, *covered, false) : covered;
+    if (!rest) return rest.error();
+    piece = std::move(*rest);
+  }
+  const std::uint32_t first = made.lines.size();
+  // The strip of a smaller half width begins the sum of both further on.
+  LineJoiner(lines, widths.maximum).for_each_chain(ChainCollector(made));
+  const double area = square_mm(doubled_area(whole)) * 1e12, left = square_mm(doubled_area(piece)) * 1e12;
+  if (made.lines.size() > first) {
+    scale_to(area - left, made, first);
+  } else if (deserves_dot(IslandBox(whole[0]), area, widths)) {
+    add_dots(whole, widths.minimum, made);
+    piece.clear();
+  }
+  made.left.append(piece);
+  return {};
 }
 
 }  // namespace
 
 Result<GapLines> gap_lines(const ContoursView& narrow, const GapWidths& widths) {
   GapLines made;
-  Contours region = without_specks(narrow, widths.minimum);
-  std::vector<CentreLine> lines;
+  const Contours region = without_specks(narrow, widths.minimum);
   const std::vector<double> half = half_widths(widths);
-  for (std::size_t i = 1; i < half.size() && region.size() > 0; ++i) {
-    const std::int64_t next = std::llround(half[i]);
-    const auto strips = offset_contours(region, -next);
-    if (!strips) return strips.error();
-    if (strips->size() == 0) continue;
-    StripFollower follower(reach_of(half[i - 1], half[i]), static_cast<Nm>(std::llround(half[i - 1] + half[i])), lines);
-    for (std::uint32_t c = 0; c < strips->size(); ++c) follower.follow((*strips)[c]);
-    const auto covered = offset_contours(*strips, next);
-    auto rest = covered ? subtract_contours(region, *covered, false) : covered;
-    if (!rest) return rest.error();
-    region = std::move(*rest);
-  }
-  made.left = std::move(region);
-  // The strip of a smaller half width begins the sum of both further on.
-  LineJoiner(lines, widths.maximum).for_each_chain(ChainCollector(made));
-  add_compact(narrow, widths, made);
-  return made;
+  Status status;
+  for_each_island(region, [&](std::uint32_t first, std::uint32_t end, double) {
+    Contours piece;
+    append_range(region, first, end, piece);
+    if (status) status = add_lines_of(std::move(piece), widths, half, made);
+  });
+  return status ? Result<GapLines>(std::move(made)) : status.error();
 }
 
 void append_gap_lines(const GapLines& lines, double height_mm, BeadShape shape, PathKind kind, Toolpaths& out) {

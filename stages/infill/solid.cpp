@@ -130,16 +130,27 @@ void CoveredArea::add_intervals(const ContoursView& centres, const LinePositions
   }
 }
 
-/// Single beads where the lines have left room.
-Status append_rest(const ContoursView& solid, const CoveredArea& covered, double pitch, const Frame& frame, double height_mm,
-                   const FillParameters& parameters, Toolpaths& out) {
+/// Appends the lines of one connected region, in their frame, and single beads where they leave room. own  of its lines
+Status append_component(const ContoursView& solid, double pitch, const Frame& frame, double height_mm, FillParameters& own,
+                        Toolpaths& out) {
+  const auto centres = offset_contours(solid, -std::llround(pitch / 2));
+  if (!centres) return centres.error();
+  const std::uint32_t before = out.size();
+  CoveredArea covered(pitch);
+  for_each_component(*centres, [&](const ContoursView& component) {
+    const SolidLines lines = solid_lines(component, pitch);
+    own.width = static_cast<Nm>(nm_of(bead_width(lines.pitch * 1e-6 * height_mm, height_mm, own.shape)));
+    append_raster(component, own, lines.positions, frame, out);
+    covered.add_intervals(component, lines.positions, own.longest_link);
+  });
+  covered.add(out, before, frame);
   // In the frame few beads are next to each other along a scan line of Clipper.
-  auto rest = subtract_contours(frame.to(solid), covered.area(), false);
+  const auto rest = subtract_contours(solid, covered.area(), false);
   if (!rest) return rest.error();
   auto lines = gap_lines(*rest, {static_cast<Nm>(2 * pitch), min_gap(pitch)});
   if (!lines) return lines.error();
   for (Point2& p : lines->lines.point) p = frame.from(p);
-  append_gap_lines(*lines, height_mm, parameters.shape, PathKind::kSolid, out);
+  append_gap_lines(*lines, height_mm, own.shape, PathKind::kSolid, out);
   return {};
 }
 
@@ -149,24 +160,18 @@ Status append_solid(const Outlines& outlines, const FillContext& context, const 
   if (outlines.solid.size() == 0) return {};
   const double pitch = solid_pitch(parameters, parameters.width, context.layer.thickness);
   const Frame frame = frame_of(context, parameters);
-  const double height = mm(context.layer.thickness);
-  const std::uint32_t before = out.size();
-  CoveredArea covered(pitch);
   const std::size_t first_point = out.point.size();
   FillParameters own = parameters;
   own.pattern = Pattern::kRaster;
   own.fills_corners = true;
   // Along edges that are nearly parallel to the lines, single beads fill what is left between the ends of lines.
   own.longest_link = std::llround(1.5 * pitch);
-  for_each_component(frame.to(outlines.solid_centres), [&](const ContoursView& component) {
-    const SolidLines lines = solid_lines(component, pitch);
-    own.width = static_cast<Nm>(nm_of(bead_width(lines.pitch * 1e-6 * height, height, parameters.shape)));
-    append_raster(component, own, lines.positions, frame, out);
-    covered.add_intervals(component, lines.positions, own.longest_link);
+  Status status;
+  for_each_component(frame.to(outlines.solid), [&](const ContoursView& component) {
+    if (status) status = append_component(component, pitch, frame, mm(context.layer.thickness), own, out);
   });
-  covered.add(out, before, frame);
   std::fill(out.kind.begin() + static_cast<std::ptrdiff_t>(first_point), out.kind.end(), PathKind::kSolid);
-  return append_rest(outlines.solid, covered, pitch, frame, height, parameters, out);
+  return status;
 }
 
 SolidBound bound_solid(const Outlines& outlines, const FillContext& context, const FillParameters& parameters) {

@@ -180,6 +180,13 @@ std::pair<std::size_t, std::size_t> path_of(const Planting& p, int layer, int nt
   return {p.in(layer, "G0 X", nth), p.in(layer, "G0 X", nth + 1)};
 }
 
+/// A travel within a layer with the filament drawn back.
+std::size_t long_travel(const Planting& p, int layer) {
+  std::size_t at = p.in(layer, "G0 X", 1);
+  while (!p.lines[at].starts_with("G0 X") || !p.lines[at - 1].starts_with("G1 E")) ++at;
+  return at;
+}
+
 const std::vector<Planted>& heat_faults() {
   static const std::vector<Planted> faults = {
       {"no heat at all", false, Defect::kCold,
@@ -229,7 +236,7 @@ const std::vector<Planted>& filament_faults() {
        }},
       {"E set to 0 before a travel", true, Defect::kOverfed,
        [](Planting& p) {
-         std::size_t at = p.insert(p.in(4, "G0 X", 2), "G92 E0");
+         std::size_t at = p.insert(long_travel(p, 4), "G92 E0");
          while (!p.lines[at].starts_with("G1 E")) ++at;
          return at + 1;
        }},
@@ -321,7 +328,7 @@ const std::vector<Planted>& path_faults() {
        [](Planting& p) {
          const std::size_t first = p.in(5, ";TYPE:External perimeter"), end = p.in(5, ";TYPE:Perimeter");
          std::size_t last = end;
-         while (!p.lines[last].starts_with("G1 E-")) --last;
+         while (!p.lines[last].starts_with("G0 X")) --last;  // to the inner wall
          p.erase(first, last);
          return p.next_bead(p.layer(5)) + 1;
        }},
@@ -338,7 +345,7 @@ const std::vector<Planted>& path_faults() {
        }},
       {"gap at the end of a wall", false, Defect::kOpenWall,
        [](Planting& p) {
-         std::size_t at = p.in(5, "G1 E-");
+         std::size_t at = path_of(p, 5, 0).second;
          while (!Planting::is_bead(p.lines[at])) --at;
          p.erase(at);
          return p.bead(5, 0) + 1;
@@ -383,7 +390,7 @@ const std::vector<Planted>& path_faults() {
          return at + 1;
        }},
       {"travel above the feed limit", true, Defect::kTooFast,
-       [](Planting& p) { return p.replace(p.in(3, "G0 X", 1), "F9000", "F90000"); }},
+       [](Planting& p) { return p.replace(long_travel(p, 3), "F9000", "F90000"); }},
       {"melt rate", false, Defect::kMeltRate,
        [](Planting& p) {
          const std::size_t at = p.bead(3, 2);

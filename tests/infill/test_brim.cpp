@@ -10,7 +10,7 @@
 namespace lamina::test {
 namespace {
 
-constexpr infill::BrimSettings kBrimSettings{5 * kMm, 400'000, 357'080, 0};
+constexpr infill::BrimSettings kBrimSettings{5 * kMm, 400'000, 357'080};
 constexpr std::array<std::int64_t, 2> kBrimBed{200 * kMm, 200 * kMm};
 
 double brim_length(const Contours& lines) {
@@ -54,6 +54,17 @@ TEST(Brim, IsWithinTheBed) {
   for (const Point2 p : brim->point) {
     EXPECT_GE(p.x, 199'999);
     EXPECT_GE(p.y, 199'999);
+  }
+}
+
+// The strip that the plate loses is bridged where the rib meets it.
+TEST(ElephantFoot, LeavesThinRibsConnected) {
+  const Contours rib = contours_of({{{0, 0}, {10, 0}, {10, 5}, {20, 5}, {20, 5.3}, {10, 5.3}, {10, 10}, {0, 10}}});
+  for (const Nm inset : {100'000, 200'000, 400'000}) {
+    const auto kept = infill::without_elephant_foot(rib, inset, 400'000);
+    ASSERT_TRUE(kept.ok());
+    EXPECT_EQ(kept->size(), 1u) << inset;
+    EXPECT_EQ(std::ranges::max(kept->point, {}, &Point2::x).x, 20'000'000) << inset;
   }
 }
 

@@ -52,7 +52,7 @@ TEST(GapLines, OfAChannelIsItsMiddle) {
     ASSERT_EQ(lines.lines.size(), 1u) << width;
     EXPECT_NEAR(length_of(lines, 0), 10 - width, 0.15) << width;
     for (const Point2 p : lines.lines.point) EXPECT_NEAR(mm(p.y), width / 2, 0.05 * width + 0.012) << width;
-    for (const Nm gap : lines.gap) EXPECT_NEAR(mm(gap), width, 0.11 * width) << width;
+    for (const Nm gap : lines.gap) EXPECT_NEAR(mm(gap), width, 0.14 * width) << width;
   }
 }
 

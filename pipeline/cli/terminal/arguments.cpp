@@ -113,13 +113,13 @@ constexpr SlicerAlias kSlicerAliases[] = {
     {"--copies", "--duplicate"},
     {"--rotate", "--rotate-x --rotate-y --rotate-z", "three angles, about x, y and z: X,Y,Z"},
     {"--skirt", "--skirts --skirt-line-count"},
+    {"--brim", "--brim-width"},
     {"--job", "--load"},
     {"--save-job", "--save"},
     {"--machine", "--printer --printer-profile"},
     {"--output", "--output-dir"},
     {"--quiet", "--loglevel"},
     {"", "--support --supports --support-material --support-enable", "lamina makes no supports"},
-    {"", "--brim --brim-width --brim-line-count", "lamina makes no brim"},
     {"", "--raft --raft-layers", "lamina makes no raft"},
 };
 

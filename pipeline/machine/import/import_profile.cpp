@@ -231,7 +231,9 @@ class ProfileImporter {
 
   Status set_material() {
     if (Status status = set_all(kMaterialKeys); !status) return status;
-    if (!is_on("cooling", true) || !is_on("slow_down_for_layer_cooling", true)) profile_.machine.fan.min_layer_s = 0;
+    if (!is_on("cooling", true) || !is_on("slow_down_for_layer_cooling", true)) {
+      if (Status status = set("fan.min_layer_s", "0", "cooling"); !status) return status;
+    }
     for (const auto& [one, other] : kTemperatures) {
       if (Status status = copy_temperature(one, other); !status) return status;
       if (Status status = copy_temperature(other, one); !status) return status;

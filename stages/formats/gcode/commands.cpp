@@ -424,15 +424,18 @@ void GcodeCommands::set_mode(char letter, double code, const GcodeWords& words) 
 
 namespace {
 
-/// M commands whose argument may be text without quotes in Marlin or RepRapFirmware, which therefore no other command follows in a line.
+/// M commands whose argument may be text without quotes in Marlin or RepRapFirmware, which therefore no other command follows
+/// in a line.
 bool takes_text(double code) {
-  constexpr double kText[] = {16, 20, 23, 26, 28, 30, 32, 33, 36, 37, 38, 39, 98, 117, 118, 486, 550, 551, 552, 587, 588, 589, 928};
+  constexpr double kText[] = {16, 20,  23,  26,  28,  30,  32,  33,  36,  37,  38, 39,
+                              98, 117, 118, 486, 550, 551, 552, 587, 588, 589, 928};
   return std::ranges::find(kText, code) != std::end(kText);
 }
 
 }  // namespace
 
-/// What follows a command that changes nothing here: RepRapFirmware runs the next G or M of the line (StringParser::FindParameters).
+/// What follows a command that changes nothing here: RepRapFirmware runs the next G or M of the line
+/// (StringParser::FindParameters).
 bool GcodeCommands::pass_over(WordScanner scanner, char letter, double code) {
   GcodeWords words;
   if (read_words(scanner, words, true) && !commands_.empty()) differ(Difference::kSeveral);

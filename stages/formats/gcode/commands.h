@@ -127,8 +127,8 @@ struct GcodeMove {
   bool states_feed_rate;
 };
 
-/// Receives all that a file commands, in its order, before GcodeCommands::next() returns the bead of it. Names and numbers of commands
-/// that GcodeCommands itself does not run come as they are.
+/// Receives all that a file commands, in its order, before GcodeCommands::next() returns the bead of it. Names and numbers of
+/// commands that GcodeCommands itself does not run come as they are.
 class CommandObserver {
  public:
   virtual ~CommandObserver() = default;

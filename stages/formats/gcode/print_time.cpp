@@ -41,7 +41,8 @@ double PrintTime::jerk_entry(const Direction& direction) const {
   return change > corner_ ? shared * corner_ / change : shared;
 }
 
-/// Klipper: a circle touches both lines; its distance from the corner is the junction deviation, and it touches them within half of each.
+/// Klipper: a circle touches both lines; its distance from the corner is the junction deviation, and it touches them within
+/// half of each.
 double PrintTime::corner_entry2(const PlannedMove& move, const Direction& direction) const {
   const PlannedMove& previous = moves_[size_ - 1];
   double entry2 = std::min({move.speed2, previous.speed2, previous.entry2 + previous.rise});
@@ -120,7 +121,8 @@ void PrintTime::finish_moves(std::size_t count) {
     const double ramps = (2 * cruise2_ - first * first - last * last) / (2 * move.acceleration);
     seconds_ += (2 * cruise - first - last) / move.acceleration + std::max(0.0, move.length - ramps) / cruise;
   }
-  std::copy(moves_.begin() + static_cast<std::ptrdiff_t>(count), moves_.begin() + static_cast<std::ptrdiff_t>(size_), moves_.begin());
+  std::copy(moves_.begin() + static_cast<std::ptrdiff_t>(count), moves_.begin() + static_cast<std::ptrdiff_t>(size_),
+            moves_.begin());
   size_ -= count;
   if (size_ > 0) moves_[0].entry2 = start2[count];
 }

@@ -1,8 +1,8 @@
-// stages/formats/gcode/print_time.h: the seconds that a firmware needs for moves, by its look-ahead. Marlin's planner.cpp (classic jerk,
-// also RepRapFirmware's and Repetier's rule): the speed of each axis, E among them, changes by at most the corner speed at once. Klipper's
-// toolhead.py: corners by its square corner velocity, a halt before and after each move of the filament alone, whose acceleration follows
-// from nozzle and filament, and cruise speeds by minimum_cruise_ratio. What a profile does not contain has the firmware's default.
-// tests/segment/print_time compares it with simulations of both planners.
+// stages/formats/gcode/print_time.h: the seconds that a firmware needs for moves, by its look-ahead. Marlin's planner.cpp
+// (classic jerk, also RepRapFirmware's and Repetier's rule): the speed of each axis, E among them, changes by at most the
+// corner speed at once. Klipper's toolhead.py: corners by its square corner velocity, a halt before and after each move of the
+// filament alone, whose acceleration follows from nozzle and filament, and cruise speeds by minimum_cruise_ratio. What a
+// profile does not contain has the firmware's default. tests/segment/print_time compares it with simulations of both planners.
 #pragma once
 
 #include <array>

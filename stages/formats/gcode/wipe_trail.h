@@ -33,7 +33,7 @@ class WipeTrail {
     if (point_.empty()) return 0;
     double way = 0;
     Point2 at = point_.back();
-    for (std::size_t i = point_.size() - 1; i-- > 0 && way < length_mm;) {
+    for (std::size_t i = point_.size() - 1; i-- > 0 && length_mm - way >= kMinLine;) {
       const Point2 b = point_[i];
       const double dx = mm(std::int64_t{b.x} - at.x), dy = mm(std::int64_t{b.y} - at.y), length = std::hypot(dx, dy);
       if (length < kMinLine) continue;

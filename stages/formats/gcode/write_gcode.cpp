@@ -38,8 +38,10 @@ std::string_view type_name(PathKind kind) {
 double fan_percent(const Extruder::Fan& fan, const Switches& switches, std::uint32_t layer) {
   const std::uint32_t first = switches.fan.value_or(fan.from_layer);
   const std::uint32_t ramp = fan.full_layer > fan.from_layer ? fan.full_layer - fan.from_layer : 0;
-  if (layer < first || layer - first > ramp) return 0;
-  return fan.percent * (layer - first + 1) / (ramp + 1);
+  if (layer < first) return 0;
+  const std::uint32_t step = layer - std::min(layer, fan.from_layer);
+  if (layer > first && step > ramp) return 0;
+  return fan.percent * (std::min(step, ramp) + 1) / (ramp + 1);
 }
 
 /// The kinds with one name are one type.
@@ -61,7 +63,9 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
   corner_y_ = nm_of(machine.bed.corner_mm[1]);
   back_ = nearest(retraction.length_mm * 1e5);
   retracted_ = retraction.length_mm > 0;
-  lift_ = retracted_ ? nm_of(retraction.lift_mm) : 0;
+  // No higher than the machine builds.
+  const std::int64_t above = std::max<std::int64_t>(0, nm_of(machine.bed.build_height_mm) - top_);
+  lift_ = retracted_ ? std::min(nm_of(retraction.lift_mm), above) : 0;
   lifted_ = lift_ > 0;
   if (around.region != nullptr && retraction.inside) {
     route_.emplace(*around.region, around.inset, retraction.detour_mm * 1e6);

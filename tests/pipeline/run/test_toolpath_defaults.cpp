@@ -102,7 +102,7 @@ TEST(ToolpathDefaults, ASkirtFillsTheNozzleThoughTheFirstLayerHoldsNoBead) {
     tip += "\nendloop\nendfacet\n";
   }
   write_text(directory / "tip.stl", tip + "endsolid tip\n");
-  const Extruded made = extruded(directory, "tip.stl --layer 0.2 --walls 1");
+  const Extruded made = extruded(directory, "tip.stl --layer 0.2 --walls 1 --fill raster");
   ASSERT_GT(made.file.layers.size(), 30u);
   EXPECT_TRUE(made.file.layers[0].beads.empty());
   EXPECT_EQ(made.file.skirt.size(), made.summary["skirt"]["moves"]);
@@ -110,7 +110,7 @@ TEST(ToolpathDefaults, ASkirtFillsTheNozzleThoughTheFirstLayerHoldsNoBead) {
   EXPECT_GT(made.summary["skirt"]["bead_mm"], 40) << "a loop 5 mm around the widest layer";
   write_box(directory / "needle.stl", {0, 0, 0}, {0.1f, 0.1f, 1});  // no bead fits into it
   write_box(directory / "head.stl", {0, 0, 0}, {4, 4, 1});
-  const Extruded needle = extruded(directory, "needle.stl --layer 0.2 --walls 1 --allow-empty");
+  const Extruded needle = extruded(directory, "needle.stl --layer 0.2 --walls 1 --fill raster --allow-empty");
   EXPECT_EQ(needle.summary["moves"], 0);
   EXPECT_GT(needle.summary["skirt"]["bead_mm"], 0);
   const auto reported = [&](const std::string& options) {
