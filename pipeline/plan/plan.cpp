@@ -102,7 +102,7 @@ class Planner {
       auto filling = plan_filling(fill, part.fill);
       if (!filling) return filling.error();
       any |= filling->fills();
-      filling->set_beads(shape, nominal);
+      filling->set_beads(shape, nominal, !moves() || plan_.moves->profile.machine.format != "sml");
       fillings_.push_back(std::move(*filling));
     }
     return any;
@@ -445,6 +445,8 @@ Result<Resolved> resolve(const Job& job, Product product) {
   }
   auto profile = resolve_extruder(job);
   if (!profile) return profile.error();
+  if (job.extrude.first_bead_mm && profile->machine.format == "sml")
+    return usage("extrude.first_bead_mm: widths of SML follow from the nozzle; leave it out");
   if (job.margin_mm) profile->machine.bed.margin_mm = *job.margin_mm;
   resolved.bed = {profile->machine.bed.size_mm, true, profile->machine.bed.margin_mm};
   resolved.extruder = std::move(*profile);

@@ -45,10 +45,11 @@ std::string contradiction(const FillSettings& settings) {
 
 }  // namespace
 
-void FillPlan::set_beads(BeadShape shape, Nm nominal_thickness) {
+void FillPlan::set_beads(BeadShape shape, Nm nominal_thickness, bool varies_width) {
   const auto set = [&](infill::FillParameters& parameters) {
     parameters.shape = shape;
     parameters.nominal_thickness = nominal_thickness;
+    parameters.varies_width = varies_width;
   };
   set(base);
   for (FillInterval& range : ranges) set(range.parameters);

@@ -32,8 +32,9 @@ struct FillPlan {
   std::vector<FillInterval> ranges;  // in order, disjoint
 
   const infill::FillParameters& at(std::int64_t height) const;
-  /// For fillings by density: the cross-section of beads, and the thickness in which sparse lines have their width.
-  void set_beads(BeadShape shape, Nm nominal_thickness);
+  /// For fillings by density: the cross-section of beads, the thickness in which sparse lines have their width, and whether the
+  /// printer makes beads of other widths.
+  void set_beads(BeadShape shape, Nm nominal_thickness, bool varies_width);
   /// All beads get a width.
   void set_width(Nm width);
   /// Whether any layer has walls or a filling.

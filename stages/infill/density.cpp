@@ -255,7 +255,12 @@ Result<WallOf> wall_of(const ContoursView& region, std::int64_t inwards, double 
 }
 
 /// Lines where the part is thinner than two walls, and what is too thin for them.
-Status add_thin_walls(const ContoursView& contours, const WallOf& wall, Nm minimum, Outlines& outlines) {
+Status add_thin_walls(const ContoursView& contours, const WallOf& wall, Nm minimum, bool varies_width, Outlines& outlines) {
+  if (!varies_width) {
+    outlines.lost = bare_islands(contours, static_cast<Nm>(2 * wall.half), {&wall.centres});
+    outlines.lost.append(narrow_features(wall.narrow, static_cast<Nm>(2 * wall.half)));
+    return {};
+  }
   auto lines = gap_lines(wall.narrow, {static_cast<Nm>(2 * wall.half), minimum});
   if (!lines) return lines.error();
   outlines.thin_walls = std::move(*lines);
@@ -292,7 +297,8 @@ Result<Outlines> outlines_by_density(const ContoursView& contours, const FillCon
     auto of = wall_of(around, wall == 0 ? parameters.wall_width / 2 : half(pitch), pitch);
     if (!of) return of.error();
     if (wall == 0) {
-      if (Status status = add_thin_walls(around, *of, min_gap(pitch), made); !status) return status.error();
+      if (Status status = add_thin_walls(around, *of, min_gap(pitch), parameters.varies_width, made); !status)
+        return status.error();
     } else {
       made.gaps.append(of->narrow);
     }
@@ -374,7 +380,7 @@ Status append_by_density(const Outlines& outlines, const FillContext& context, c
                          Toolpaths& out) {
   const Nm thickness = context.layer.thickness;
   append_gap_lines(outlines.thin_walls, mm(thickness), parameters.shape, PathKind::kOuter, out);
-  if (outlines.gaps.size() > 0) {
+  if (outlines.gaps.size() > 0 && parameters.varies_width) {
     const auto lines = gap_lines(outlines.gaps, gap_widths(parameters, thickness));
     if (!lines) return lines.error();
     append_gap_lines(*lines, mm(thickness), parameters.shape, PathKind::kSolid, out);

@@ -60,6 +60,7 @@ struct FillParameters {
   // --- by density (density.h): all of the above that spaces lines is unused
   std::optional<double> density;                           // 0 .. 1
   BeadShape shape = BeadShape::kStadium;                   // cross-section of the beads, which decides their pitch
+  bool varies_width = true;                                // else only beads of the set width are made
   Nm nominal_thickness = 200'000;                          // of the layers in which sparse lines are `width` wide
   Nm top = 0, bottom = 0;                                  // thickness of skins; 0: none
   std::optional<std::uint32_t> top_layers, bottom_layers;  // instead

@@ -144,6 +144,7 @@ Status append_component(const ContoursView& solid, double pitch, const Frame& fr
     covered.add_intervals(component, lines.positions, own.longest_link);
   });
   covered.add(out, before, frame);
+  if (!own.varies_width) return {};
   // In the frame few beads are next to each other along a scan line of Clipper.
   const auto rest = subtract_contours(solid, covered.area(), false);
   if (!rest) return rest.error();
