@@ -330,27 +330,21 @@ TEXT = [
     "- Travel: combing of CuraEngine is off, because lamina has none. All other settings are each program's defaults.", ""]
 WALL_TEXT = [
     "The walls of the box agree with hand-calculated ones within 0.2 %, else the script stops. The column lamina / CuraEngine is near "
-    f"{PITCH / WIDTH:.3f}, the ratio of the sections, except where walls overlap. Arachne varies the widths of walls: on herringbone_wheels its "
-    "walls have 3.8 % less volume than PrusaSlicer's own classic ones, and lamina is 5 % above it.", "",
-    "CuraEngine reduces the flow of walls that overlap; lamina does not. Without this compensation (column of the table below) its walls "
-    "have more volume:", ""]
+    f"{PITCH / WIDTH:.3f}, the ratio of the sections, except where walls are near each other. Arachne varies the widths of walls.", "",
+    "CuraEngine reduces the flow of walls that overlap. lamina and PrusaSlicer classic keep opposite walls apart, and fill what is narrower "
+    "with single beads; those of lamina are in its solid volume. Walls without CuraEngine's compensation:", ""]
 RIB_TEXT = [
     "", "Ribs of 30 x 4 mm at 100 %: extruded volume over that of the rib. Above 1, opposite walls overlap.", ""]
 NOTES = {
-    "am_coin": "letters and rim are so narrow that opposite inner walls are less than a pitch apart. lamina deposits both. PrusaSlicer "
-               "classic omits them and fills the gap: see walls and gaps above. CuraEngine reduces the flow of the overlap.",
-    "honeycomb_vase": "walls of 1 mm, wider in sections of inclined ones; the same cause as am_coin. PrusaSlicer classic has gap fill of more "
-                      "than its inner walls. The two programs with overlapping walls and no compensation agree."}
+    "am_coin": "letters and rim are so narrow that opposite inner walls are less than a pitch apart: single beads in lamina and PrusaSlicer "
+               "classic, two walls of reduced flow in CuraEngine.",
+    "honeycomb_vase": "walls of 1 mm, wider in sections of inclined ones; the same cause as am_coin."}
 TOTAL_TEXT = [
     "Reasons for totals outside of the peers':", "",
     "- Solid layers, for all others. PrusaSlicer's margin around a face is 3 mm, lamina's one bead. On the step, 2.6 mm more x 18.5 mm x 4 layers "
     "are 38.5 mm3: see *By kind*. CuraEngine adds strips next to inclined walls: on the frustum, it has nearly three times lamina's solid volume. "
     "lamina extrudes the four layers above and three below that were requested, with walls counted.",
-    "- Overlaps. honeycomb_vase is the only part above both peers: its inner walls overlap (accounted 1.02), as on ribs of 1.15 to "
-    "1.3 mm.",
-    "- Gap fill. PrusaSlicer fills places between walls up to two beads wide; lamina extrudes sparse lines there. 3DBenchy at z = 21 mm: "
-    "places "
-    "of 0.58 to 0.67 mm between inner walls, most of that layer's filling.",
+    "- honeycomb_vase is above both peers, which leave 2 to 3 % of it empty: see *Accounted*.",
     "- Sparse lines. PrusaSlicer's end half a pitch earlier, so its accounted volume is less.",
     "- Brims. lamina's loops keep sharp corners, those of both peers are round (box: 1400, 1342 and 1252 mm of line, as "
     "hand-calculated), so the brim of the toothed herringbone_wheels is wider at the teeth. With rectangles, lamina has 12 loops "
