@@ -20,6 +20,7 @@
 #include "stages/infill/density.h"
 #include "stages/infill/skirt.h"
 #include "stages/segment/moves.h"
+#include "stages/slice/bodies.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::pipeline {

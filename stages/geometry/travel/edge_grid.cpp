@@ -125,8 +125,7 @@ void EdgeGrid::crossings(Point2 a, Point2 b, Buffer<EdgeCrossing>& found) const 
     return false;
   });
   std::ranges::sort(found);
-  const auto same = std::ranges::unique(found);  // an edge is in several cells
-  found.erase(same.begin(), same.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());  // an edge is in several cells
 }
 
 bool EdgeGrid::contains(Point2 p) const {
