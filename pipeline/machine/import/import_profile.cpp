@@ -91,6 +91,9 @@ class ProfileImporter {
           path_);
     if (Status status = printer ? set_printer() : Status(); !status) return status.error();
     if (Status status = set_material(); !status) return status.error();
+    const auto of_material = [](const std::string& key) { return key.starts_with("material."); };
+    if (!printer && std::ranges::none_of(set_, of_material))
+      return usage("{}: has no value of a material; export the filament's settings again", path_);
     ImportedProfile imported;
     std::string source = std::filesystem::path(path_).filename().string();
     if (!request_.choice.printer.empty()) source += ", " + request_.choice.printer;

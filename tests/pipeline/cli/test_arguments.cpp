@@ -103,7 +103,7 @@ TEST(SlicerAliases, OfOtherSlicersAreAnsweredWithOurs) {
       {"extrude", "--rotate-x", "'--rotate'"},
       {"extrude", "--support", "lamina makes no supports"},
       {"jet", "--support_material", "lamina makes no supports"},
-      {"extrude", "--brim", "lamina makes no brim"},
+      {"extrude", "--brim-width", "'--brim'"},
       {"extrude", "--raft-layers", "lamina makes no raft"},
   };
   for (const auto& row : rows) EXPECT_NE(requested(row.command, row.flag).find(row.ours), std::string::npos) << row.flag;

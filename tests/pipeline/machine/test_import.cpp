@@ -144,6 +144,7 @@ TEST(ImportedProfiles, AreRefusedInOneLineThatSaysWhy) {
   expect_refused_as(from_bundle("Two"), Fault::kUsage, "end_gcode: 'if layer_z < 20' is a condition");
   const auto text = [](std::string_view config) { return import_profile(config, "a.ini", {}); };
   expect_refused_as(text(""), Fault::kUsage, "neither a bed nor temperatures");
+  expect_refused_as(text("temperature = \n"), Fault::kUsage, "has no value of a material");
   expect_refused_as(text("solid cube\n facet\n"), Fault::kInput, "a.ini:1: 'solid cube' is not key = value");
   expect_refused_as(text(std::string_view("bed_shape = 0x0\0", 16)), Fault::kUsage, "no text");
   expect_refused_as(text("[machine]\nname = \"x\"\n"), Fault::kUsage, "has no section [printer:NAME]");
