@@ -88,7 +88,8 @@ Result<Contours> combine(const ContoursView& contours, const ContoursView& with,
   return guarded([&](Contours& out) -> Status {
     const Point2 by = middle_of(contours);
     clip::Clipper clipper(simple ? clip::ioStrictlySimple : 0);
-    clipper.AddPaths(to_clipper(contours, by), clip::ptSubject, true);
+    // Contours that are points or lines are not taken; without any, Clipper fails.
+    if (!clipper.AddPaths(to_clipper(contours, by), clip::ptSubject, true)) return {};
     clipper.AddPaths(to_clipper(with, by), clip::ptClip, true);
     clip::PolyTree tree;
     if (!clipper.Execute(how, tree, rule, rule)) return refusal(failure);

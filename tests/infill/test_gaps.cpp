@@ -107,6 +107,16 @@ TEST(NarrowPart, IsWhatNoDiscReaches) {
   EXPECT_EQ(none->size(), 0u) << "corners are sharp";
 }
 
+// Clipper fails without an edge that it takes.
+TEST(GapLines, OfADegeneratePieceAreNone) {
+  const Contours line = contours_of({{{0, 0}, {10, 0}, {5, 0}}}), square = contours_of({{{0, 0}, {1, 0}, {1, 1}, {0, 1}}});
+  for (const auto& region : {subtract_contours(line, square), intersect_contours(line, square)}) {
+    ASSERT_TRUE(region.ok());
+    EXPECT_EQ(region->size(), 0u);
+  }
+  EXPECT_EQ(lines_of(line).lines.size(), 0u);
+}
+
 TEST(GapLines, BecomeBeadsOfTheirVolume) {
   const GapLines lines = lines_of(contours_of({{{0, 0}, {10, 0}, {10, 0.2}, {0, 0.2}}}));
   for (const double height : {0.1, 0.3}) {
