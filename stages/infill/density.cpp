@@ -379,7 +379,8 @@ Status divide_skins(const ContoursView& covered, const FillContext& context, con
 Status append_by_density(const Outlines& outlines, const FillContext& context, const FillParameters& parameters,
                          Toolpaths& out) {
   const Nm thickness = context.layer.thickness;
-  append_gap_lines(outlines.thin_walls, mm(thickness), parameters.shape, PathKind::kOuter, out);
+  // Not as walls, which close.
+  append_gap_lines(outlines.thin_walls, mm(thickness), parameters.shape, PathKind::kSolid, out);
   if (outlines.gaps.size() > 0 && parameters.varies_width) {
     const auto lines = gap_lines(outlines.gaps, gap_widths(parameters, thickness));
     if (!lines) return lines.error();
