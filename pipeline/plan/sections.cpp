@@ -12,6 +12,7 @@
 #include "pipeline/job/keys.h"
 #include "stages/geometry/boxes.h"
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/edge_bands.h"
 #include "stages/geometry/contours/nest.h"
 #include "stages/infill/brim.h"
 #include "stages/infill/density.h"
@@ -487,6 +488,8 @@ Status Sections::keep_covered(std::uint32_t index, const Area& area, Contours& r
   const infill::FillParameters& parameters = filling(area, schedule_.layers[index].own());
   const Layer layer = schedule_.layers[index].layer;
   Buffer<std::uint32_t> rebased;
+  ContainmentTest within;
+  within.set_inner(region);
   for (const bool up : {true, false}) {
     std::optional<std::uint32_t> at = index;
     for (std::uint32_t steps = 0; region.size() > 0; ++steps) {
@@ -502,9 +505,12 @@ Status Sections::keep_covered(std::uint32_t index, const Area& area, Contours& r
       }
       const auto other = shared_contours(*at);
       if (!other) return other.error();
-      auto both = intersect_contours(region, (*other)->contours.of(area.body, rebased), false);
+      const ContoursView section = (*other)->contours.of(area.body, rebased);
+      if (within.certainly_in(section)) continue;
+      auto both = intersect_contours(region, section, false);
       if (!both) return both.error();
       region = std::move(*both);
+      within.set_inner(region);
     }
   }
   return {};

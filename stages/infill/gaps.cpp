@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <unordered_map>
@@ -116,6 +117,7 @@ struct CentreLine {
   double length = 0;
 };
 
+constexpr double kRounding = 4;     // nm, of points that an offset moves
 constexpr double kFinest = 15'000;  // nm, of the difference of two half widths: nozzles are no finer
 
 /// Half widths, from the widest to the narrowest: a sixth less each.
@@ -410,33 +412,91 @@ bool deserves_dot(const IslandBox& box, double area, const GapWidths& widths) {
   return area >= whole / 8 && area <= whole && area >= around / 2;
 }
 
+/// nm, a bound of the radius of circles in a contour: half of the extent across an edge, the circle of the same area, and that
+/// of a tangential polygon for convex contours.
+double bound_radius(std::span<const Point2> contour) {
+  constexpr std::size_t kEdges = 32;  // of longer contours, so many are measured
+  const double area = square_mm(doubled_area(contour)) * 1e12;
+  double radius = std::sqrt(area / std::numbers::pi), perimeter = 0;
+  bool convex = true;
+  const std::size_t stride = (contour.size() + kEdges - 1) / kEdges;
+  for (std::size_t i = 0; i < contour.size(); i += stride) {
+    const Point2 a = contour[i], b = contour[i + 1 < contour.size() ? i + 1 : 0];
+    const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, length = std::hypot(dx, dy);
+    double low = 0, high = 0;
+    for (const Point2 p : contour) {
+      const double away = dx * (static_cast<double>(p.y) - a.y) - dy * (static_cast<double>(p.x) - a.x);
+      low = std::min(low, away);
+      high = std::max(high, away);
+    }
+    perimeter += length;
+    convex &= low >= 0;
+    if (length > 0) radius = std::min(radius, (high - low) / (2 * length));
+  }
+  return convex && stride == 1 && perimeter > 0 ? std::min(radius, 2 * area / perimeter) : radius;
+}
+
+/// An outer contour with its holes.
+struct Island {
+  Contours contours;
+  double radius;  // nm, at most, of circles in it
+};
+
+void append_islands(const ContoursView& region, std::vector<Island>& islands) {
+  for_each_island(region, [&](std::uint32_t first, std::uint32_t end, double) {
+    append_range(region, first, end, islands.emplace_back(Contours(), bound_radius(region[first])).contours);
+  });
+}
+
+/// Follows the strip of an island between two half widths, and appends what the line along it does not cover to `rest`.
+Status follow_strip(Island& island, std::int64_t half, StripFollower& follower, std::vector<Island>& rest) {
+  const auto strips = offset_contours(island.contours, -half);
+  if (!strips) return strips.error();
+  if (strips->size() == 0) {
+    rest.push_back(std::move(island));
+    return {};
+  }
+  for (std::uint32_t c = 0; c < strips->size(); ++c) follower.follow((*strips)[c]);
+  const auto covered = offset_contours(*strips, half);
+  const auto bare = covered ? subtract_contours(island.contours, *covered, false) : covered;
+  if (!bare) return bare.error();
+  append_islands(*bare, rest);
+  return {};
+}
+
 /// The lines of one connected piece.
-Status add_lines_of(Contours piece, const GapWidths& widths, const std::vector<double>& half, GapLines& made) {
-  const Contours whole = piece;
+Status add_lines_of(const ContoursView& piece, const GapWidths& widths, const std::vector<double>& half, GapLines& made) {
   std::vector<CentreLine> lines;
-  for (std::size_t i = 1; i < half.size() && piece.size() > 0; ++i) {
+  std::vector<Island> islands, rest;
+  append_islands(piece, islands);
+  for (std::size_t i = 1; i < half.size(); ++i) {
     const std::int64_t next = std::llround(half[i]);
-    const auto strips = offset_contours(piece, -next);
-    if (!strips) return strips.error();
-    if (strips->size() == 0) continue;
+    const auto has_room = [&](const Island& island) { return island.radius + kRounding >= static_cast<double>(next); };
+    if (std::ranges::none_of(islands, has_room)) continue;
     StripFollower follower(reach_of(half[i - 1], half[i]), static_cast<Nm>(std::llround(half[i - 1] + half[i])), lines);
-    for (std::uint32_t c = 0; c < strips->size(); ++c) follower.follow((*strips)[c]);
-    const auto covered = offset_contours(*strips, next);
-    auto rest = covered ? subtract_contours(piece, *covered, false) : covered;
-    if (!rest) return rest.error();
-    piece = std::move(*rest);
+    rest.clear();
+    for (Island& island : islands) {
+      if (!has_room(island)) {
+        rest.push_back(std::move(island));
+      } else if (Status status = follow_strip(island, next, follower, rest); !status) {
+        return status;
+      }
+    }
+    islands.swap(rest);
   }
   const std::uint32_t first = made.lines.size();
   // The strip of a smaller half width begins the sum of both further on.
   LineJoiner(lines, widths.maximum).for_each_chain(ChainCollector(made));
-  const double area = square_mm(doubled_area(whole)) * 1e12, left = square_mm(doubled_area(piece)) * 1e12;
+  double left = 0;
+  for (const Island& island : islands) left += square_mm(doubled_area(island.contours)) * 1e12;
+  const double area = square_mm(doubled_area(piece)) * 1e12;
   if (made.lines.size() > first) {
     scale_to(area - left, made, first);
-  } else if (deserves_dot(IslandBox(whole[0]), area, widths)) {
-    add_dots(whole, widths.minimum, made);
-    piece.clear();
+  } else if (deserves_dot(IslandBox(piece[0]), area, widths)) {
+    add_dots(piece, widths.minimum, made);
+    return {};
   }
-  made.left.append(piece);
+  for (const Island& island : islands) made.left.append(island.contours);
   return {};
 }
 
@@ -450,7 +510,7 @@ Result<GapLines> gap_lines(const ContoursView& narrow, const GapWidths& widths) 
   for_each_island(region, [&](std::uint32_t first, std::uint32_t end, double) {
     Contours piece;
     append_range(region, first, end, piece);
-    if (status) status = add_lines_of(std::move(piece), widths, half, made);
+    if (status) status = add_lines_of(piece, widths, half, made);
   });
   return status ? Result<GapLines>(std::move(made)) : status.error();
 }
