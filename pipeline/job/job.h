@@ -83,6 +83,9 @@ struct ExtrudeRequest {
   double brim_mm = 0;                                        // width of loops around the parts
   double elephant_foot_mm = 0;                               // by which contours are moved inwards
   std::optional<double> first_thickness_mm, first_bead_mm;   // absent: as in the others
+  // --- of layers under the parts; with some, the settings of the first layer are those of the raft's
+  std::uint32_t raft_layers = 0;
+  double raft_gap_mm = 0.1, raft_margin_mm = 3;  // up to the parts; around them
   std::string material;                                      // name of a material, or a file; empty: the printer's
   std::vector<std::pair<std::string, std::string>> machine;  // other profile keys with values: fan.from_layer, 2
 };

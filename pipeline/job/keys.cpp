@@ -392,6 +392,17 @@ const JobKey kExtrudeKeys[] = {
         {"extrude", "elephant_foot_mm", "--elephant-foot", "MM", "inset of the first layer's outline in mm", decides::moves},
         {0, 2, " mm"})
         .unsaid_at("0"),
+    field<&Job::extrude, &ExtrudeRequest::raft_layers>(
+        {"extrude", "raft_layers", "--raft", "N", "number of raft layers under the parts; 0: none", decides::moves}, {0, 20})
+        .unsaid_at("0"),
+    field<&Job::extrude, &ExtrudeRequest::raft_gap_mm>(
+        {"extrude", "raft_gap_mm", "--raft-gap", "MM", "distance from the raft to the parts in mm", decides::moves},
+        {0, 1, " mm"})
+        .unsaid_at("0.1"),
+    field<&Job::extrude, &ExtrudeRequest::raft_margin_mm>(
+        {"extrude", "raft_margin_mm", "--raft-margin", "MM", "width of the raft around the parts in mm", decides::moves},
+        {0, 50, " mm"})
+        .unsaid_at("3"),
     machine_key()};
 
 // --- [load], [run]

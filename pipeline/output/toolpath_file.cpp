@@ -122,6 +122,7 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
 
 ToolpathFile::ToolpathFile(const Plan& plan)
     : plan_(plan),
+      raft_(plan_raft(plan.job.extrude, plan.sections->layers().front().layer.thickness)),
       format_(formats::make_extrusion_format(
           plan.moves->profile.machine, {after_first(plan, 1), after_first(plan, plan.moves->profile.machine.fan.from_layer)})) {
   if (plan.moves->profile.machine.code.objects != "none") objects_ = print_objects(*plan.sections);
@@ -155,7 +156,13 @@ std::unique_ptr<formats::LayerMoves> ToolpathFile::layer(const Layer& layer, Buf
   formats::LayerSurroundings all = around;
   all.segmented = plan_.segments->any();
   all.objects = objects_;
-  return format_->layer(layer, layers(), text, all);
+  if (all.progress) all.progress->layer += raft_layers();
+  const Layer lifted{layer.index + raft_layers(), layer.bottom + raft_.lift, layer.thickness};
+  return format_->layer(lifted, layers(), text, all);
+}
+
+std::unique_ptr<formats::LayerMoves> ToolpathFile::raft_layer(const Layer& layer, Buffer<char>& text) const {
+  return format_->layer(layer, layers(), text);
 }
 
 Result<std::uint64_t> ToolpathFile::finish(const formats::MoveTotals& totals) {

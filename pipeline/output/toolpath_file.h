@@ -9,6 +9,7 @@
 
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/plan/raft.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 #include "stages/formats/extrusion_format.h"
@@ -32,6 +33,10 @@ class ToolpathFile {
   /// around  without objects, which are added; must outlive what is returned
   std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text,
                                              const formats::LayerSurroundings& around) const;
+  /// As layer(), for one of the raft.
+  std::unique_ptr<formats::LayerMoves> raft_layer(const Layer& layer, Buffer<char>& text) const;
+  /// The layers under those of the parts, which the file lifts.
+  const RaftPlan& raft() const { return raft_; }
 
   // --- from one thread at a time, in layer order
   /// Adds the travel from the layers before to a layer.
@@ -42,9 +47,11 @@ class ToolpathFile {
   void discard();
 
  private:
-  std::uint32_t layers() const { return plan_.range[1] - plan_.range[0]; }
+  std::uint32_t layers() const { return raft_layers() + plan_.range[1] - plan_.range[0]; }
+  std::uint32_t raft_layers() const { return static_cast<std::uint32_t>(raft_.layers.size()); }
 
   const Plan& plan_;
+  RaftPlan raft_;
   std::vector<formats::ExtrusionObject> objects_;
   std::unique_ptr<formats::ExtrusionFormat> format_;
   std::optional<LayeredFile> file_;

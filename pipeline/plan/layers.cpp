@@ -71,8 +71,9 @@ Result<heights::Plan> decide_heights(const Job& job, const Scene& scene) {
   if (!options) return options.error();
   if (options->mode != heights::Mode::kUniform) return heights::plan_heights(index_scene(job, scene, *options), *options);
   heights::Plan plan;
+  const double first = job.extrude.raft_layers > 0 ? 0 : job.extrude.first_thickness_mm.value_or(0);
   plan.table = heights::LayerTable::uniform(scene.height, options->set.minimum(),
-                                            static_cast<Nm>(nm_of(job.extrude.first_thickness_mm.value_or(0))));
+                                            static_cast<Nm>(nm_of(first)));
   return plan;
 }
 

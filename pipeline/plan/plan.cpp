@@ -9,6 +9,7 @@
 
 #include "pipeline/job/errors.h"
 #include "pipeline/plan/layers.h"
+#include "pipeline/plan/raft.h"
 #include "pipeline/plan/repeated.h"
 #include "pipeline/plan/scene.h"
 #include "stages/checks/layer_warnings.h"
@@ -223,9 +224,11 @@ class Planner {
     plan_.range = *range;
     if (!moves()) return {};
     const Extruder& machine = plan_.moves->profile.machine;
-    if (mm(plan_.scene->height) > machine.bed.build_height_mm) {
-      return usage("the parts are {:.3f} mm high, {} builds {:.3f} mm; turn or scale them", mm(plan_.scene->height),
-                   machine.name, machine.bed.build_height_mm);
+    const RaftPlan raft = plan_raft(job().extrude, schedule_.layers.front().layer.thickness);
+    if (mm(std::int64_t{plan_.scene->height} + raft.lift) > machine.bed.build_height_mm) {
+      return usage("the parts are {:.3f} mm high{}, {} builds {:.3f} mm; turn or scale them", mm(plan_.scene->height),
+                   raft.lift > 0 ? fmt::format(" on a raft of {:.3f} mm", mm(raft.lift)) : "", machine.name,
+                   machine.bed.build_height_mm);
     }
     const auto format = formats::make_extrusion_format(machine);
     for (std::uint32_t i = plan_.range[0]; i < plan_.range[1]; ++i) {
@@ -447,6 +450,7 @@ Result<Resolved> resolve(const Job& job, Product product) {
   if (!profile) return profile.error();
   if (job.extrude.first_bead_mm && profile->machine.format == "sml")
     return usage("extrude.first_bead_mm: widths of SML follow from the nozzle; leave it out");
+  if (Status status = check_raft(job, profile->machine); !status) return status.error();
   if (job.margin_mm) profile->machine.bed.margin_mm = *job.margin_mm;
   resolved.bed = {profile->machine.bed.size_mm, true, profile->machine.bed.margin_mm};
   resolved.extruder = std::move(*profile);

@@ -117,8 +117,9 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   made.schedule_ = std::move(schedule);
   made.plans_ = std::move(fillings);
   made.fills_ = std::ranges::any_of(made.plans_, &FillPlan::fills);
-  made.elephant_foot_ = static_cast<Nm>(nm_of(job.extrude.elephant_foot_mm));
-  if (job.extrude.first_bead_mm) {
+  const bool on_bed = job.extrude.raft_layers == 0;
+  if (on_bed) made.elephant_foot_ = static_cast<Nm>(nm_of(job.extrude.elephant_foot_mm));
+  if (on_bed && job.extrude.first_bead_mm) {
     made.first_plans_ = made.plans_;
     for (FillPlan& plan : made.first_plans_) plan.set_width(static_cast<Nm>(nm_of(*job.extrude.first_bead_mm)));
   }

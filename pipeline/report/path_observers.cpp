@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pipeline/plan/layers.h"
+#include "pipeline/plan/raft.h"
 #include "pipeline/report/overhang_observer.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/checks/lost_features_tally.h"
@@ -274,17 +275,36 @@ class BeadObserver : public MoveObserver {
         "beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
                              (totals.bead_mm - totals.auxiliary_mm) / 1000, summary.volume_mm3 / 1000,
                              readable_count(totals.travels), totals.travel_mm / 1000));
-    const char* none = plan_.moves->profile.machine.skirt.loops == 0 || !plan_.sections->fills() ? "none"
-                       : plan_.range[0] > 0 ? "none: --layers leaves the first layer out"
-                                            : "none: no space on the bed";
-    summary.results.emplace_back("skirt",
-                                 totals.auxiliary_moves == 0
-                                     ? std::string(none)
-                                     : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, in addition to the parts",
-                                                   totals.auxiliary_mm, totals.auxiliary_mm3, totals.auxiliary_filament_mm));
+    add_auxiliary(summary);
   }
 
  private:
+  /// Skirt, brim and raft.
+  void add_auxiliary(Summary& summary) const {
+    const formats::MoveTotals& totals = sums_.totals;
+    const ExtrudeRequest& request = plan_.job.extrude;
+    const char* none = plan_.moves->profile.machine.skirt.loops == 0 || !plan_.sections->fills() ? "none"
+                       : plan_.range[0] > 0 ? "none: --layers leaves the first layer out"
+                                            : "none: no space on the bed";
+    const bool with_skirt = plan_.moves->profile.machine.skirt.loops > 0 && (request.raft_layers > 0 || request.brim_mm > 0);
+    std::string text = totals.auxiliary_moves == 0
+                           ? std::string(none)
+                           : fmt::format("{}{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, in addition to the parts",
+                                         with_skirt ? "with the skirt " : "", totals.auxiliary_mm, totals.auxiliary_mm3,
+                                         totals.auxiliary_filament_mm);
+    if (request.raft_layers > 0) {
+      const RaftPlan raft = plan_raft(request, plan_.sections->layers().front().layer.thickness);
+      summary.results.emplace_back("raft", fmt::format("{} layer{}, {:g} mm to the parts with a gap of {:g} mm; {}",
+                                                       request.raft_layers, request.raft_layers > 1 ? "s" : "", mm(raft.lift),
+                                                       request.raft_gap_mm, text));
+    } else if (request.brim_mm > 0) {
+      if (plan_.sections->layers().front().layer.bottom > 0) text += "; no brim, since the parts begin above the bed";
+      summary.results.emplace_back("brim", text);
+    } else {
+      summary.results.emplace_back("skirt", text);
+    }
+  }
+
   const Plan& plan_;
   const PathFacts& sums_;
   checks::PathWarnings paths_;

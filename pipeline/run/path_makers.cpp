@@ -12,62 +12,16 @@
 #include "pipeline/plan/overhangs.h"
 #include "pipeline/plan/segment.h"
 #include "pipeline/report/path_observers.h"
+#include "pipeline/run/around_parts.h"
 #include "pipeline/run/progress_estimate.h"
 #include "pipeline/run/travel_region.h"
 #include "stages/bead/even_starts.h"
 #include "stages/formats/extrusion_format.h"
-#include "stages/infill/brim.h"
-#include "stages/infill/density.h"
-#include "stages/infill/skirt.h"
 #include "stages/segment/moves.h"
-#include "stages/slice/bodies.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 namespace {
-
-/// Adds lines, as fast and as wide as a wall.
-void deposit_lines(const Plan& plan, const Layer& layer, const Contours& lines, Nm width, formats::LayerMoves& out) {
-  const segment::LayerCut uncut{};
-  segment::MoveTable table(plan.segments->base.plan, uncut, plan.moves->profile.machine, layer);
-  for (std::uint32_t c = 0; c < lines.size(); ++c) {
-    for (std::size_t i = 0; i + 1 < lines[c].size(); ++i) {
-      PathInterval interval{};
-      interval.from = lines[c][i];
-      interval.to = lines[c][i + 1];
-      if (interval.from == interval.to) continue;
-      interval.kind = PathKind::kOuter;
-      interval.width = width;
-      interval.line = kNoLine;
-      const segment::MoveTable::MoveEntry& entry = table.of(interval);
-      out.deposit({interval.from, interval.to, PathKind::kSkirt, i == 0, entry.width, entry.area, entry.speed});
-    }
-  }
-}
-
-/// Adds the skirt and the brim. The first layer of a job that begins at the bed has a skirt, with beads or not.
-/// errors  kInternal of Clipper
-Status deposit_around(const Plan& plan, const Layer& layer, const ContoursView& contours, formats::LayerMoves& out) {
-  const Extruder& machine = plan.moves->profile.machine;
-  const FillSettings& fill = plan.job.fill.all;
-  const ExtrudeRequest& request = plan.job.extrude;
-  const auto width =
-      static_cast<Nm>(nm_of(request.first_bead_mm.value_or(fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm)));
-  const std::array<std::int64_t, 2> bed{nm_of(machine.bed.size_mm[0]), nm_of(machine.bed.size_mm[1])};
-  const std::int64_t reach = nm_of(request.brim_mm);
-  const Box around = slice::grown(plan.sections->bounds(), static_cast<Nm>(reach));
-  deposit_lines(plan, layer, infill::skirt_around(around, machine.skirt, width, bed), width, out);
-  if (reach == 0 || layer.bottom > 0) return {};
-  infill::FillParameters parameters;
-  parameters.shape = machine.material.shape();
-  const double pitch = infill::solid_pitch(parameters, width, layer.thickness);
-  const auto foot = static_cast<Nm>(nm_of(request.elephant_foot_mm));
-  const auto printed = infill::without_elephant_foot(contours, foot, width);
-  const auto brim = printed ? infill::brim_around(*printed, {reach, width, pitch}, bed) : printed;
-  if (!brim) return brim.error();
-  deposit_lines(plan, layer, *brim, width, out);
-  return {};
-}
 
 ToolpathsView paths_of(const Sections::Work& work, std::uint32_t area) {
   ToolpathsView paths = work.paths;
@@ -460,12 +414,15 @@ class MoveMaker : public Maker {
     made.facts = facts_of(work);
     made.facts.area_mm2 = checks_.add_contours(made.record.layer, work.contours);
     work.text.clear();
+    const auto raft = raft_of(layer, work, work.text);
+    if (!raft) return raft.error();
     const TravelRegion region(plan_, work);
     const auto out = file_.layer(made.record.layer, work.text, region.surroundings(progress_.before(layer)));
     const std::size_t maximum =
         plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
     const auto deposited = deposit_moves(plan_, layer, work, {work.text, maximum, [] { return false; }}, *out, made.facts);
     if (!deposited) return deposited.error();
+    add_before(*raft, made.facts);
     made.waits = *deposited;
     if (made.waits) {
       made.record.bytes = work.text.size();
@@ -478,6 +435,8 @@ class MoveMaker : public Maker {
 
   Status deposit_pieces(std::uint32_t layer, const Sections::Work& work, Made& made) {
     piece_.clear();
+    const auto raft = raft_of(layer, work, piece_);
+    if (!raft) return raft.error();
     Status status;
     const auto give = [&] {
       status = file_.file().append_piece({piece_.data(), piece_.size()});
@@ -489,7 +448,21 @@ class MoveMaker : public Maker {
     const auto deposited = deposit_moves(plan_, layer, work, {piece_, kPieceOfText, give}, *out, made.facts);
     if (!deposited) return deposited.error();
     if (!status) return status;
+    add_before(*raft, made.facts);
     return file_.file().append_piece({piece_.data(), piece_.size()});
+  }
+
+  /// The text of what is under a layer. returns  its sums
+  Result<formats::MoveTotals> raft_of(std::uint32_t layer, const Sections::Work& work, Buffer<char>& text) const {
+    if (layer > 0) return formats::MoveTotals();
+    return append_raft(plan_, file_, work.contours.contours, text);
+  }
+  void add_before(const formats::MoveTotals& raft, PathFacts& facts) const {
+    if (raft.moves == 0) return;
+    file_.travel_from(raft, facts.totals);
+    formats::MoveTotals all = raft;
+    all.add(facts.totals);
+    facts.totals = all;
   }
 
   /// The time of a layer, which is planned and dropped for it. errors  of its steps
@@ -498,11 +471,14 @@ class MoveMaker : public Maker {
     if (Status status = plan_.sections->layer(layer, work); !status) return status.error();
     Buffer<char> text;
     PathFacts facts;
+    const auto raft = raft_of(layer, work, text);
+    if (!raft) return raft.error();
     const TravelRegion region(plan_, work);
     const auto out = file_.layer(plan_.layer(layer), text, region.surroundings({}));
     const auto drop = [&] { return text.clear(), true; };
     const auto deposited = deposit_moves(plan_, layer, work, {text, kPieceOfText, drop}, *out, facts);
     if (!deposited) return deposited.error();
+    add_before(*raft, facts);
     formats::MoveTotals with_travel = facts.totals;  // from the layer below: as long as one from this layer's end to its start
     file_.travel_from(facts.totals, with_travel);
     return with_travel.seconds;

@@ -21,9 +21,13 @@ enum class PathKind : std::uint8_t {
   kContour,  // a closed curve that fills: concentric offsets
   kLink,     // short way from the end of one raster line to the start of the next, along the edge of the filled region
   kSkirt,    // around all parts, before the first bead of any: never stored, only moved
-  kSolid     // a line or link of what is solid in a part of lower density
+  kSolid,    // a line or link of what is solid in a part of lower density
+  kSupport   // of a raft: never stored, only moved
 };
-inline constexpr std::size_t kPathKinds = 7;
+inline constexpr std::size_t kPathKinds = 8;
+
+/// Whether beads are deposited in addition to the parts.
+constexpr bool is_auxiliary(PathKind kind) { return kind == PathKind::kSkirt || kind == PathKind::kSupport; }
 
 /// Line number of walls and links.
 inline constexpr std::int32_t kNoLine = INT32_MIN;

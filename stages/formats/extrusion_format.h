@@ -26,7 +26,7 @@ struct MoveTotals {
   double filament_mm = 0;  // sum of E; what is drawn back comes again and does not count
   double seconds = 0;      // as the firmware plans the moves (gcode/print_time.h)
   std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
-  // The share of moves, beads, volume and filament that is not of the parts: skirts and prime lines.
+  // The share of moves, beads, volume and filament that is not of the parts: skirts, brims and rafts.
   std::uint64_t auxiliary_moves = 0;
   double auxiliary_mm = 0, auxiliary_mm3 = 0, auxiliary_filament_mm = 0;
   Point2 first{0, 0}, last{0, 0};  // where the first bead begins and the nozzle stops, if there are beads
@@ -61,7 +61,7 @@ struct MoveTotals {
     bead_mm += length_mm;
     volume_mm3 += volume;
     filament_mm += volume * feed;
-    if (move.kind == PathKind::kSkirt) {
+    if (is_auxiliary(move.kind)) {
       ++auxiliary_moves;
       auxiliary_mm += length_mm;
       auxiliary_mm3 += volume;

@@ -86,7 +86,7 @@ constexpr std::size_t kMaxShades = 4;
 /// Equal in all pictures.
 Ink ink_of(PathKind kind) {
   constexpr Ink kInks[] = {{176, 58, 46},  {214, 137, 16},  {36, 113, 163}, {17, 120, 100},
-                           {142, 68, 173}, {127, 140, 141}, {28, 58, 112}};
+                           {142, 68, 173}, {127, 140, 141}, {28, 58, 112},  {149, 165, 166}};
   return kInks[static_cast<std::size_t>(kind)];
 }
 
@@ -96,7 +96,8 @@ PathKind kind_of(const std::string& type) {
   std::ranges::transform(word, word.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   const auto has = [&](std::string_view part) { return word.find(part) != std::string::npos; };
   if (has("skirt") || has("brim")) return PathKind::kSkirt;
-  if (has("support") || has("prime") || has("wipe") || has("custom")) return PathKind::kLink;
+  if (has("support")) return PathKind::kSupport;
+  if (has("prime") || has("wipe") || has("custom")) return PathKind::kLink;
   if (has("solid") || has("skin") || has("surface")) return PathKind::kSolid;
   if (has("infill") || has("fill") || word.empty()) return PathKind::kRaster;
   if (has("external") || has("outer")) return PathKind::kOuter;

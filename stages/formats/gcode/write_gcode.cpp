@@ -30,6 +30,7 @@ std::string_view type_name(PathKind kind) {
     case PathKind::kInner: return "Perimeter";
     case PathKind::kSkirt: return "Skirt/Brim";
     case PathKind::kSolid: return "Solid infill";
+    case PathKind::kSupport: return "Support material";
     default: return "Internal infill";
   }
 }

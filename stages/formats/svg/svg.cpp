@@ -32,6 +32,7 @@ PathStyle style_of(PathKind kind) {
     case PathKind::kLink: return {"link", "#8e44ad"};
     case PathKind::kSkirt: return {"skirt", "#7f8c8d"};
     case PathKind::kSolid: return {"solid", "#27408b"};
+    case PathKind::kSupport: return {"support", "#95a5a6"};
   }
   return {"", "#000000"};
 }
