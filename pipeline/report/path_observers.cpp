@@ -279,6 +279,14 @@ class BeadObserver : public MoveObserver {
   }
 
  private:
+  /// Of loops of the brim.
+  double first_pitch_mm() const {
+    const FillSettings& fill = plan_.job.fill.all;
+    const double width = plan_.job.extrude.first_bead_mm.value_or(fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm);
+    const double height = mm(plan_.sections->layers().front().layer.thickness);
+    return bead_area(width, height, plan_.moves->profile.machine.material.shape()) / height;
+  }
+
   /// Skirt, brim and raft.
   void add_auxiliary(Summary& summary) const {
     const formats::MoveTotals& totals = sums_.totals;
@@ -299,6 +307,7 @@ class BeadObserver : public MoveObserver {
                                                        request.raft_gap_mm, text));
     } else if (request.brim_mm > 0) {
       if (plan_.sections->layers().front().layer.bottom > 0) text += "; no brim, since the parts begin above the bed";
+      if (request.brim_mm < first_pitch_mm() / 2) text += "; no loop of the brim fits into its width";
       summary.results.emplace_back("brim", text);
     } else {
       summary.results.emplace_back("skirt", text);

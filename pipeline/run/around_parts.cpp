@@ -83,8 +83,11 @@ Status deposit_around(const Plan& plan, const Layer& layer, const ContoursView& 
   parameters.shape = machine.material.shape();
   const double pitch = infill::solid_pitch(parameters, width, layer.thickness);
   const auto foot = static_cast<Nm>(nm_of(request.elephant_foot_mm));
-  const auto printed = infill::without_elephant_foot(contours, foot, width);
-  const auto brim = printed ? infill::brim_around(*printed, {reach, width, pitch}, bed_of(machine)) : printed;
+  Result<Contours> printed = Contours();
+  if (foot > 0) printed = infill::without_elephant_foot(contours, foot, width);
+  if (!printed) return printed.error();
+  const auto brim =
+      infill::brim_around(foot > 0 ? ContoursView(*printed) : contours, {reach, width, pitch}, bed_of(machine));
   if (!brim) return brim.error();
   AuxiliaryBeads(plan, layer, PathKind::kSkirt, PathKind::kOuter, out).add(*brim, width);
   return {};

@@ -1,5 +1,9 @@
 #include "pipeline/run/progress_estimate.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <atomic>
 #include <cmath>
 
 namespace lamina::pipeline {
@@ -21,6 +25,22 @@ std::vector<std::uint32_t> sampled(std::uint32_t count) {
   return layers;
 }
 
+/// By all threads, upwards together: neighbours of skins are shared.
+Result<std::vector<double>> time_of_layers(const std::vector<std::uint32_t>& layers, std::uint32_t first,
+                                           const std::function<Result<double>(std::uint32_t)>& seconds_of) {
+  std::vector<Result<double>> found(layers.size(), 0.0);
+  std::atomic<std::size_t> next{0};
+  tbb::parallel_for(0, tbb::this_task_arena::max_concurrency(), [&](int) {
+    for (std::size_t i; (i = next++) < layers.size();) found[i] = seconds_of(first + layers[i]);
+  });
+  std::vector<double> seconds;
+  for (const Result<double>& of : found) {
+    if (!of) return of.error();
+    seconds.push_back(*of);
+  }
+  return seconds;
+}
+
 }  // namespace
 
 Result<ProgressEstimate> ProgressEstimate::make(std::uint32_t first, std::uint32_t end,
@@ -28,17 +48,15 @@ Result<ProgressEstimate> ProgressEstimate::make(std::uint32_t first, std::uint32
   ProgressEstimate estimate;
   estimate.first_ = first;
   if (end <= first) return estimate;
+  const std::vector<std::uint32_t> layers = sampled(end - first);
+  auto sample = time_of_layers(layers, first, seconds_of);
+  if (!sample) return sample.error();
   std::vector<double> seconds(end - first);
-  std::uint32_t before = 0;
-  for (const std::uint32_t at : sampled(end - first)) {
-    const auto of = seconds_of(first + at);
-    if (!of) return of.error();
-    seconds[at] = *of;
-    for (std::uint32_t i = before + 1; i < at; ++i) {
-      const double share = static_cast<double>(i - before) / (at - before);
-      seconds[i] = std::lerp(seconds[before], seconds[at], share);
-    }
-    before = at;
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const std::uint32_t at = layers[i], before = i > 0 ? layers[i - 1] : at;
+    seconds[at] = (*sample)[i];
+    for (std::uint32_t between = before + 1; between < at; ++between)
+      seconds[between] = std::lerp(seconds[before], seconds[at], static_cast<double>(between - before) / (at - before));
   }
   estimate.over_.push_back(0);
   for (const double of : seconds) estimate.over_.push_back(estimate.over_.back() + of);

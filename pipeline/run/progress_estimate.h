@@ -19,7 +19,7 @@ class ProgressEstimate {
 
   ProgressEstimate() = default;
   /// first, end   layers of the file
-  /// seconds_of   the time of a layer
+  /// seconds_of   the time of a layer; called by many threads at once
   /// errors       of seconds_of
   static Result<ProgressEstimate> make(std::uint32_t first, std::uint32_t end,
                                        const std::function<Result<double>(std::uint32_t)>& seconds_of);

@@ -1,5 +1,6 @@
 #include "pipeline/run/run.h"
 
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -20,6 +21,7 @@
 #include "pipeline/run/path_makers.h"
 #include "pipeline/run/space.h"
 #include "stages/checks/layer_warnings.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -56,6 +58,9 @@ Summary summary_of(const Plan& plan) {
   summary.dry_run = plan.job.dry_run;
   summary.output = plan.job.output;
   summary.layer_text = text_of(plan.job.heights, plan.job.layer_mm);
+  const auto& first_mm = plan.job.extrude.first_thickness_mm;
+  if (plan.moves && first_mm && plan.job.extrude.raft_layers == 0 && *first_mm != plan.job.layer_mm)
+    summary.layer_text += fmt::format(", the first of {} mm", number_text(*first_mm));
   const std::string small = small_peaks_text(plan.heights, plan.job.heights.min_flat_mm2);
   if (!small.empty()) summary.layer_text += "; " + small;
   summary.triangles = plan.triangles;

@@ -7,6 +7,7 @@
 
 #include "stages/geometry/box_clip.h"
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/components.h"
 
 namespace lamina::checks {
 namespace {
@@ -15,20 +16,6 @@ constexpr std::int64_t kRounding = 4;  // nm: points of both sections, the reach
 
 /// The reach less what rounding may add to the growth of a face, but more than that of vertical walls.
 std::int64_t certain(std::int64_t reach) { return std::max(reach - kRounding, kRounding); }
-
-/// The contours [begin, end) of all.
-ContoursView part_of(const ContoursView& all, std::uint32_t begin, std::uint32_t end, Buffer<std::uint32_t>& rebased) {
-  rebased.clear();
-  for (std::uint32_t c = begin; c <= end; ++c) rebased.push_back(all.offset[c] - all.offset[begin]);
-  return {rebased, all.point.subspan(all.offset[begin], all.offset[end] - all.offset[begin])};
-}
-
-/// One past the holes of the outer contour at `begin`.
-std::uint32_t end_of_component(const ContoursView& all, std::uint32_t begin) {
-  std::uint32_t end = begin + 1;
-  while (end < all.size() && doubled_area(all[end]) < 0) ++end;
-  return end;
-}
 
 /// The contours below that components can meet once they grow.
 Contours below_components(const ContoursView& components, const RegionBelow& below, std::int64_t reach) {
@@ -156,7 +143,7 @@ LayerOverhang measure_overhang(const ContoursView& contours) {
   };
   std::vector<Piece> pieces;
   for (std::uint32_t begin = 0, end = 0; begin < contours.size(); begin = end) {
-    end = end_of_component(contours, begin);
+    end = component_end(contours, begin);
     __int128 doubled = 0;
     for (std::uint32_t c = begin; c < end; ++c) doubled += doubled_area(contours[c]);
     pieces.push_back({begin, end, square_mm(doubled)});
@@ -168,7 +155,7 @@ LayerOverhang measure_overhang(const ContoursView& contours) {
   pieces.resize(count);
   Buffer<std::uint32_t> rebased;
   for (const Piece& piece : pieces) {
-    const ContoursView component = part_of(contours, piece.begin, piece.end, rebased);
+    const ContoursView component = range_of(contours, piece.begin, piece.end, rebased);
     const PlanarBox box = box_around(component[0]);
     facts.spots.push_back({piece.area_mm2, point_within(component), box.lo, box.hi});
   }
@@ -187,8 +174,8 @@ Result<Contours> find_overhangs(const ContoursView& own, const ContoursView& bel
     Contours candidates;
     std::vector<PlanarBox> uncarried;
     for (std::uint32_t begin = 0, end = 0; begin < own.size(); begin = end) {
-      end = end_of_component(own, begin);
-      const ContoursView component = part_of(own, begin, end, rebased);
+      end = component_end(own, begin);
+      const ContoursView component = range_of(own, begin, end, rebased);
       const bool shares = shares_area(component, scratch);
       const std::size_t before = uncarried.size();
       find_uncarried(component, scratch, certain(reach) - 1, uncarried);

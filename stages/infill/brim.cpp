@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <vector>
 
 #include "stages/geometry/clipping.h"
@@ -28,6 +29,24 @@ void append_closed_loops(const ContoursView& region, Contours& out) {
   }
 }
 
+/// Appends loops around islands in holes of other parts, which end where the hole does.
+///
+/// holes   of the region that is enclosed, without the islands in them
+/// errors  kInternal of Clipper
+Status append_island_loops(const ContoursView& holes, std::int64_t away, Contours& out) {
+  if (std::ranges::none_of(std::views::iota(0u, holes.size()), [&](std::uint32_t c) { return doubled_area(holes[c]) < 0; }))
+    return {};
+  const auto shrunk = offset_contours(holes, -away);
+  if (!shrunk) return shrunk.error();
+  for (std::uint32_t c = 0; c < shrunk->size(); ++c) {
+    if (doubled_area((*shrunk)[c]) >= 0) continue;
+    out.point.insert(out.point.end(), (*shrunk)[c].rbegin(), (*shrunk)[c].rend());
+    out.point.push_back((*shrunk)[c].back());
+    out.close();
+  }
+  return {};
+}
+
 bool is_within(const ContoursView& lines, const ContoursView& box) {
   const Point2 low = box.point[0], high = box.point[2];
   return std::ranges::all_of(lines.point,
@@ -38,16 +57,19 @@ bool is_within(const ContoursView& lines, const ContoursView& box) {
 
 Result<Contours> brim_around(const ContoursView& layer, const BrimSettings& settings, std::array<std::int64_t, 2> bed) {
   std::vector<Contours> loops;
-  auto region = contour_union(outer_contours(layer), FillRule::kNonzero);
+  // Not strictly simple: that takes long where a brim has thousands of corners.
+  auto region = contour_union(outer_contours(layer), FillRule::kNonzero, false);
+  const auto holes = region ? subtract_contours(*region, layer, false) : region;
+  if (!holes) return holes;
   double at = 0;
   for (double next = settings.pitch / 2; region && next <= static_cast<double>(settings.reach); next += settings.pitch) {
     auto grown = offset_contours(*region, std::llround(next) - std::llround(at));
-    if (grown) grown = contour_union(*grown, FillRule::kNonzero);
     region = std::move(grown);
     at = next;
-    if (region) append_closed_loops(*region, loops.emplace_back());
+    if (!region) return region;
+    append_closed_loops(*region, loops.emplace_back());
+    if (Status status = append_island_loops(*holes, std::llround(next), loops.back()); !status) return status.error();
   }
-  if (!region) return region.error();
   const Nm half = settings.width / 2;
   const Nm x = static_cast<Nm>(bed[0] - half), y = static_cast<Nm>(bed[1] - half);
   Contours within;

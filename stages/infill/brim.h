@@ -20,7 +20,7 @@ struct BrimSettings {
 /// Closed loops around the outer contours of a layer, outermost first, each with its first point again at its end. Loops of
 /// parts that are near each other are one. Loops that leave the bed are open lines within it.
 ///
-/// layer   clean contours of all parts, without their elephant foot; holes get no brim
+/// layer   clean contours of all parts, without their elephant foot; holes get no brim, but islands in them do
 /// bed     nm, from 0; beads are within it with their full width
 /// errors  kInternal of Clipper
 Result<Contours> brim_around(const ContoursView& layer, const BrimSettings& settings, std::array<std::int64_t, 2> bed);

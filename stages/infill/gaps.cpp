@@ -11,6 +11,7 @@
 
 #include "stages/geometry/bead_section.h"
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/components.h"
 
 namespace lamina::infill {
 namespace {
@@ -19,16 +20,14 @@ constexpr double kNarrower = 5.0 / 6;            // half widths at most so far a
 constexpr std::int64_t kLineTolerance = 5'000;   // nm by which a line may cut its corners
 constexpr std::int64_t kShortestLine = 200'000;  // nm: a line that is shorter is the end of a bead of its own
 
-/// Calls use(contours) for each outer contour with its holes, as a range of numbers.
+/// Calls use(begin, end, area) for each outer contour with its holes. area  nm2
 template <class Use>
 void for_each_island(const ContoursView& region, Use use) {
-  for (std::uint32_t first = 0, end = 0; first < region.size(); first = end) {
-    end = first + 1;
-    while (end < region.size() && doubled_area(region[end]) < 0) ++end;
+  for_each_component(region, [&](std::uint32_t begin, std::uint32_t end) {
     double area = 0;
-    for (std::uint32_t c = first; c < end; ++c) area += square_mm(doubled_area(region[c]));
-    use(first, end, area * 1e12);
-  }
+    for (std::uint32_t c = begin; c < end; ++c) area += square_mm(doubled_area(region[c]));
+    use(begin, end, area * 1e12);
+  });
 }
 
 struct IslandBox {
@@ -471,12 +470,12 @@ Status add_lines_of(const ContoursView& piece, const GapWidths& widths, const st
   append_islands(piece, islands);
   for (std::size_t i = 1; i < half.size(); ++i) {
     const std::int64_t next = std::llround(half[i]);
-    const auto has_room = [&](const Island& island) { return island.radius + kRounding >= static_cast<double>(next); };
-    if (std::ranges::none_of(islands, has_room)) continue;
+    const auto may_fit = [&](const Island& island) { return island.radius + kRounding >= static_cast<double>(next); };
+    if (std::ranges::none_of(islands, may_fit)) continue;
     StripFollower follower(reach_of(half[i - 1], half[i]), static_cast<Nm>(std::llround(half[i - 1] + half[i])), lines);
     rest.clear();
     for (Island& island : islands) {
-      if (!has_room(island)) {
+      if (!may_fit(island)) {
         rest.push_back(std::move(island));
       } else if (Status status = follow_strip(island, next, follower, rest); !status) {
         return status;

@@ -8,6 +8,7 @@
 
 #include "stages/geometry/bead_section.h"
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/components.h"
 #include "stages/infill/density.h"
 #include "stages/infill/gaps.h"
 #include "stages/infill/layout.h"
@@ -38,15 +39,9 @@ SolidLines solid_lines(const ContoursView& inset, double pitch) {
 
 /// Calls use(region) for each outer contour with the holes in it. region  clean contours
 template <class Use>
-void for_each_component(const ContoursView& region, Use use) {
-  Buffer<std::uint32_t> offset;
-  for (std::uint32_t first = 0, end = 0; first < region.size(); first = end) {
-    end = first + 1;
-    while (end < region.size() && doubled_area(region[end]) < 0) ++end;
-    offset.clear();
-    for (std::uint32_t c = first; c <= end; ++c) offset.push_back(region.offset[c] - region.offset[first]);
-    use(ContoursView{offset, region.point.subspan(region.offset[first], offset.back())});
-  }
+void for_each_region(const ContoursView& region, Use use) {
+  Buffer<std::uint32_t> rebased;
+  for_each_component(region, [&](std::uint32_t begin, std::uint32_t end) { use(range_of(region, begin, end, rebased)); });
 }
 
 /// Rectangles around segments, in the frame of the lines.
@@ -137,7 +132,7 @@ Status append_component(const ContoursView& solid, double pitch, const Frame& fr
   if (!centres) return centres.error();
   const std::uint32_t before = out.size();
   CoveredArea covered(pitch);
-  for_each_component(*centres, [&](const ContoursView& component) {
+  for_each_region(*centres, [&](const ContoursView& component) {
     const SolidLines lines = solid_lines(component, pitch);
     own.width = static_cast<Nm>(nm_of(bead_width(lines.pitch * 1e-6 * height_mm, height_mm, own.shape)));
     append_raster(component, own, lines.positions, frame, out);
@@ -168,7 +163,7 @@ Status append_solid(const Outlines& outlines, const FillContext& context, const 
   // Along edges that are nearly parallel to the lines, single beads fill what is left between the ends of lines.
   own.longest_link = std::llround(1.5 * pitch);
   Status status;
-  for_each_component(frame.to(outlines.solid), [&](const ContoursView& component) {
+  for_each_region(frame.to(outlines.solid), [&](const ContoursView& component) {
     if (status) status = append_component(component, pitch, frame, mm(context.layer.thickness), own, out);
   });
   std::fill(out.kind.begin() + static_cast<std::ptrdiff_t>(first_point), out.kind.end(), PathKind::kSolid);
@@ -178,7 +173,7 @@ Status append_solid(const Outlines& outlines, const FillContext& context, const 
 SolidBound bound_solid(const Outlines& outlines, const FillContext& context, const FillParameters& parameters) {
   const double pitch = solid_pitch(parameters, parameters.width, context.layer.thickness);
   SolidBound bound;
-  for_each_component(frame_of(context, parameters).to(outlines.solid_centres), [&](const ContoursView& component) {
+  for_each_region(frame_of(context, parameters).to(outlines.solid_centres), [&](const ContoursView& component) {
     bound.crossings += count_crossings(component, solid_lines(component, pitch).positions);
   });
   bound.gap_points = bound_gap_points(outlines.solid, {static_cast<Nm>(2 * pitch), min_gap(pitch)});

@@ -46,6 +46,28 @@ TEST(Brim, HasNoLoopInHolesAndOneAroundNeighbours) {
   EXPECT_EQ(infill::brim_around(two, kBrimSettings, kBrimBed)->size(), 15u);
 }
 
+// Around an island 3 mm from the edge of its hole, loops meet half-way: 4 are nearer than 1.5 mm.
+TEST(Brim, HasLoopsAroundIslandsInHoles) {
+  const Contours target = contours_of({{{50, 50}, {70, 50}, {70, 70}, {50, 70}},
+                                       {{55, 55}, {55, 65}, {65, 65}, {65, 55}},
+                                       {{58, 58}, {62, 58}, {62, 62}, {58, 62}}});
+  const auto brim = infill::brim_around(target, kBrimSettings, kBrimBed);
+  ASSERT_TRUE(brim.ok());
+  EXPECT_EQ(brim->size(), 18u);
+  double length = 0;
+  for (std::uint32_t c = 0; c < brim->size(); ++c) {
+    const auto loop = (*brim)[c];
+    const Nm left = std::ranges::min(loop, {}, &Point2::x).x;
+    if (left < 55 * kMm) continue;
+    EXPECT_EQ(loop.front(), loop.back());
+    for (std::size_t i = 1; i < loop.size(); ++i)
+      length += std::hypot(mm(std::int64_t{loop[i].x} - loop[i - 1].x), mm(std::int64_t{loop[i].y} - loop[i - 1].y));
+  }
+  double expected = 0;
+  for (int k = 0; k < 4; ++k) expected += 4 * (4 + 2 * (k + 0.5) * 0.35708);
+  EXPECT_NEAR(length, expected, 0.01);
+}
+
 TEST(Brim, IsWithinTheBed) {
   const Contours square = contours_of({{{1, 1}, {21, 1}, {21, 21}, {1, 21}}});
   const auto brim = infill::brim_around(square, kBrimSettings, kBrimBed);

@@ -45,6 +45,9 @@ Job unusual_job(const Directory& directory) {
   job.extrude.first_thickness_mm = 0.25;
   job.extrude.first_bead_mm = 0.45;
   job.extrude.elephant_foot_mm = 0.125;
+  job.extrude.raft_layers = 2;
+  job.extrude.raft_gap_mm = 0.25;
+  job.extrude.raft_margin_mm = 4;
   job.fill.ranges = {{1, 2.5, changes_of("{ gap_mm = 0, pattern = 'contour' }")}, {3, 4, {}}};
   job.segment.ranges = {{0, 1.5, {}}};
   job.extrude.material = directory / "own/resin.toml";
