@@ -488,7 +488,7 @@ def page(result):
              f"`--threads` 1, 2 and 4 write the same bytes for {sum(len(set(part['digests'].values())) == 1 for part in parts.values())} of "
              f"{len(parts)} parts.", "", "## By kind", "",
              "`other` is empty in all files. CuraEngine tags gaps and thin walls as skin: their volume is the difference to runs without them. "
-             "lamina tags gaps as solid. All tag thin walls as outer walls, except CuraEngine.", "",
+             "lamina tags both as solid; PrusaSlicer tags thin walls as outer walls.", "",
              *table(["part", "program", *KINDS[:-1], "without brim", "total", "layers"], kind_rows(parts)),
              "## Again", "", "    scripts/bench peers", "    scripts/bench peers --case time --runs 5", "    scripts/bench peers --part nut"]
     with open(os.path.join(ROOT, "bench/peers.md"), "w", encoding="utf-8") as file:

@@ -164,6 +164,17 @@ Result<bool> names_extruder(const std::string& name_or_file) {
   return !have_section(*files, "head") || have_section(*files, "material");
 }
 
+namespace {
+
+/// Whether the format of a machine's files can express a profile key.
+bool has_key_in_file(const Extruder& machine, std::string_view key) {
+  if (machine.format != "sml") return !key.starts_with("sml.");
+  constexpr std::string_view kOfGcode[] = {"fan.", "code.", "retraction."};
+  return std::ranges::none_of(kOfGcode, [&](std::string_view section) { return key.starts_with(section); });
+}
+
+}  // namespace
+
 Result<ExtruderProfile> resolve_extruder(const Job& job) {
   if (Status status = check_there(job, {job.extrude.material}); !status) return status.error();
   auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile, job.extrude.material);
@@ -175,6 +186,9 @@ Result<ExtruderProfile> resolve_extruder(const Job& job) {
   for (const auto& [name, value] : job.extrude.machine) {
     if (const std::string wrong = set_extruder_key(name, value, profile); !wrong.empty())
       return usage("extrude.machine: {}", wrong);
+    if (!has_key_in_file(profile.machine, name))
+      return usage("extrude.machine: {}: is not in {}, which {} reads; leave it out", name,
+                   profile.machine.format == "sml" ? "SML" : "G-code", profile.machine.name);
   }
   const ExtrudeRequest& r = job.extrude;
   Extruder& m = profile.machine;
