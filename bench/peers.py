@@ -348,7 +348,7 @@ TOTAL_TEXT = [
     "- Sparse lines. PrusaSlicer's end half a pitch earlier, so its accounted volume is less.",
     "- Brims. lamina's loops keep sharp corners, those of both peers are round (box: 1400, 1342 and 1252 mm of line, as "
     "hand-calculated), so the brim of the toothed herringbone_wheels is wider at the teeth. With rectangles, lamina has 12 loops "
-    "(4.8 mm), CuraEngine 13 (5.2 mm). CuraEngine makes brims around islands in holes too (am_coin).", "",
+    "(4.8 mm), CuraEngine 13 (5.2 mm). Both have loops around islands in holes (am_coin).", "",
     "By kind, in mm3, from the nearest peer:", ""]
 
 
