@@ -101,6 +101,8 @@ bool scaled(Product, const Job& job) {
   return !std::ranges::all_of(job.parts, nominal);
 }
 bool shrinks(Product product, const Job& job) { return by_steps(product, job) && scaled(product, job); }
+bool has_raft(Product, const Job& job) { return job.extrude.raft_layers > 0; }
+bool is_on_bed(Product, const Job& job) { return job.extrude.raft_layers == 0; }
 bool has_core(Product, const Job& job) { return job.dose.core < 1 || job.dose.core_saturation_percent || fills(job); }
 bool dithers(Product, const Job& job) { return job.levels > 0 || job.dose.saturation_percent; }
 /// Filament printers deposit a wall unless something else is requested.
@@ -162,6 +164,7 @@ constexpr std::string_view kUniform =
                            kCovered = "applies to --heights angle and optimal, the others reach the top; add one of them",
                            kShrinks =
                                "applies to steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
+                           kRaft = "applies to a raft, but there is none; add --raft",
                            kBeads = "applies to beads, but there are none; add --fill, --pattern or --walls",
                            kLines = "applies to lines, but there is no pattern; add --fill or --pattern",
                            kSparse = "applies to a filling by density, and there is none below 100 %; add --density",
@@ -181,6 +184,9 @@ constexpr Need kNeeds[] = {
     {"--time-model", optimal, kOptimal, optimal},
     {"--shell", has_core, "applies to a core of less binder, but there is none; add --core, --core-saturation or --fill"},
     {"--no-dither", dithers, "applies to fractions of drops, but there are none; add --levels or --saturation"},
+    {"--raft-gap", has_raft, kRaft},
+    {"--raft-margin", has_raft, kRaft},
+    {"--elephant-foot", is_on_bed, "applies to parts on the bed, and --raft is between; leave one of them out"},
     {"--bead-ends", deposits_beads, kBeads},
     {"--bead", deposits_beads, kBeads},
     {"--bead-gap", deposits_lines, kLines},

@@ -169,8 +169,14 @@ namespace {
 /// Whether the format of a machine's files can express a profile key.
 bool has_key_in_file(const Extruder& machine, std::string_view key) {
   if (machine.format != "sml") return !key.starts_with("sml.");
-  constexpr std::string_view kOfGcode[] = {"fan.", "code.", "retraction."};
-  return std::ranges::none_of(kOfGcode, [&](std::string_view section) { return key.starts_with(section); });
+  constexpr std::string_view kOfGcode[] = {"fan.",
+                                           "code.",
+                                           "retraction.",
+                                           "material.nozzle_degc",
+                                           "material.bed_degc",
+                                           "material.first_nozzle_degc",
+                                           "material.first_bed_degc"};
+  return std::ranges::none_of(kOfGcode, [&](std::string_view of) { return key.starts_with(of); });
 }
 
 }  // namespace

@@ -156,13 +156,15 @@ std::unique_ptr<formats::LayerMoves> ToolpathFile::layer(const Layer& layer, Buf
   formats::LayerSurroundings all = around;
   all.segmented = plan_.segments->any();
   all.objects = objects_;
-  if (all.progress) all.progress->layer += raft_layers();
   const Layer lifted{layer.index + raft_layers(), layer.bottom + raft_.lift, layer.thickness};
   return format_->layer(lifted, layers(), text, all);
 }
 
-std::unique_ptr<formats::LayerMoves> ToolpathFile::raft_layer(const Layer& layer, Buffer<char>& text) const {
-  return format_->layer(layer, layers(), text);
+std::unique_ptr<formats::LayerMoves> ToolpathFile::raft_layer(
+    const Layer& layer, Buffer<char>& text, const std::optional<formats::LayerSurroundings::Progress>& progress) const {
+  formats::LayerSurroundings around;
+  around.progress = progress;
+  return format_->layer(layer, layers(), text, around);
 }
 
 Result<std::uint64_t> ToolpathFile::finish(const formats::MoveTotals& totals) {

@@ -34,7 +34,8 @@ class ToolpathFile {
   std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text,
                                              const formats::LayerSurroundings& around) const;
   /// As layer(), for one of the raft.
-  std::unique_ptr<formats::LayerMoves> raft_layer(const Layer& layer, Buffer<char>& text) const;
+  std::unique_ptr<formats::LayerMoves> raft_layer(
+      const Layer& layer, Buffer<char>& text, const std::optional<formats::LayerSurroundings::Progress>& progress) const;
   /// The layers under those of the parts, which the file lifts.
   const RaftPlan& raft() const { return raft_; }
 

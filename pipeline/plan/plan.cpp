@@ -230,7 +230,13 @@ class Planner {
                    raft.lift > 0 ? fmt::format(" on a raft of {:.3f} mm", mm(raft.lift)) : "", machine.name,
                    machine.bed.build_height_mm);
     }
+    const auto bottom = [](const PartSummary& part) { return part.bounds.lo.z; };
+    if (const Nm lowest = std::ranges::min(plan_.scene->parts, {}, bottom).bounds.lo.z; raft.lift > 0 && lowest > 0)
+      return usage("extrude.raft_layers (--raft): the parts begin {:g} mm above the bed; put one of them on it", mm(lowest));
     const auto format = formats::make_extrusion_format(machine);
+    for (const Layer& layer : raft.layers) {
+      if (Status status = format->check(layer); !status) return status;
+    }
     for (std::uint32_t i = plan_.range[0]; i < plan_.range[1]; ++i) {
       if (Status status = format->check(schedule_.layers[i].layer); !status) return status;
     }

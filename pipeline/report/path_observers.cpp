@@ -306,7 +306,7 @@ class BeadObserver : public MoveObserver {
                                                        request.raft_layers, request.raft_layers > 1 ? "s" : "", mm(raft.lift),
                                                        request.raft_gap_mm, text));
     } else if (request.brim_mm > 0) {
-      if (plan_.sections->layers().front().layer.bottom > 0) text += "; no brim, since the parts begin above the bed";
+      if (plan_.sections->bounds().lo.z > 0) text += "; no brim, since the parts begin above the bed";
       if (request.brim_mm < first_pitch_mm() / 2) text += "; no loop of the brim fits into its width";
       summary.results.emplace_back("brim", text);
     } else {
@@ -431,6 +431,10 @@ class FilamentObserver : public MoveObserver {
                       {"bead_mm", totals.auxiliary_mm},
                       {"volume_mm3", totals.auxiliary_mm3},
                       {"filament_mm", totals.auxiliary_filament_mm}};
+    if (const ExtrudeRequest& request = plan_.job.extrude; request.raft_layers > 0) {
+      const RaftPlan raft = plan_raft(request, plan_.sections->layers().front().layer.thickness);
+      facts["raft"] = {{"layers", request.raft_layers}, {"lift_mm", mm(raft.lift)}, {"gap_mm", request.raft_gap_mm}};
+    }
     facts["print_seconds"] = totals.seconds;
   }
 

@@ -93,11 +93,11 @@ Status deposit_around(const Plan& plan, const Layer& layer, const ContoursView& 
   return {};
 }
 
-Result<formats::MoveTotals> append_raft(const Plan& plan, const ToolpathFile& file, const ContoursView& contours,
-                                        Buffer<char>& text) {
-  formats::MoveTotals totals;
+Result<std::vector<formats::MoveTotals>> append_raft(const Plan& plan, const ToolpathFile& file, const ContoursView& contours,
+                                                     const ProgressEstimate& progress, Buffer<char>& text) {
+  std::vector<formats::MoveTotals> sums;
   const RaftPlan& raft = file.raft();
-  if (raft.layers.empty()) return totals;
+  if (raft.layers.empty()) return sums;
   const Extruder& machine = plan.moves->profile.machine;
   const auto margin = static_cast<Nm>(nm_of(plan.job.extrude.raft_margin_mm));
   const auto region = infill::raft_region(contours, margin, bed_of(machine));
@@ -110,14 +110,14 @@ Result<formats::MoveTotals> append_raft(const Plan& plan, const ToolpathFile& fi
     Toolpaths paths;
     if (Status status = infill::append_raft(*region, layer, static_cast<std::uint32_t>(raft.layers.size()), own, paths); !status)
       return status.error();
-    const auto out = file.raft_layer(layer, text);
+    const auto out = file.raft_layer(layer, text, progress.before_raft(layer.index));
     if (layer.index == 0) deposit_skirt(plan, layer, margin, *out);
     AuxiliaryBeads(plan, layer, PathKind::kSupport, PathKind::kInner, *out).add(paths);
-    formats::MoveTotals own_totals = out->finish();
-    file.travel_from(totals, own_totals);
-    totals.add(own_totals);
+    formats::MoveTotals totals = out->finish();
+    if (!sums.empty()) file.travel_from(sums.back(), totals);
+    sums.push_back(totals);
   }
-  return totals;
+  return sums;
 }
 
 }  // namespace lamina::pipeline

@@ -1,8 +1,11 @@
 // pipeline/run/around_parts.h: what is deposited before the parts: skirt and brim in their first layer, a raft under it.
 #pragma once
 
+#include <vector>
+
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/run/progress_estimate.h"
 #include "stages/data/contours.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
@@ -17,9 +20,10 @@ Status deposit_around(const Plan& plan, const Layer& layer, const ContoursView& 
 /// Appends the text of the raft's layers; nothing without a raft.
 ///
 /// contours  of all parts in their first layer
-/// returns   the sums over the raft
+/// progress  at the start of each
+/// returns   the sums over each of them, with the travel to it
 /// errors    kInternal of Clipper
-Result<formats::MoveTotals> append_raft(const Plan& plan, const ToolpathFile& file, const ContoursView& contours,
-                                        Buffer<char>& text);
+Result<std::vector<formats::MoveTotals>> append_raft(const Plan& plan, const ToolpathFile& file, const ContoursView& contours,
+                                                     const ProgressEstimate& progress, Buffer<char>& text);
 
 }  // namespace lamina::pipeline

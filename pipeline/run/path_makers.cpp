@@ -315,8 +315,10 @@ class MoveMaker : public Maker {
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = file_.open(); !status) return status.error();
     if (plan_.moves->profile.machine.code.progress) {
-      auto estimate =
-          ProgressEstimate::make(plan_.range[0], plan_.range[1], [&](std::uint32_t layer) { return seconds_of(layer); });
+      const auto raft = seconds_of_raft();
+      if (!raft) return raft.error();
+      auto estimate = ProgressEstimate::make(plan_.range[0], plan_.range[1], *raft,
+                                             [&](std::uint32_t layer) { return seconds_of(layer); });
       if (!estimate) return estimate.error();
       progress_ = std::move(*estimate);
     }
@@ -453,16 +455,28 @@ class MoveMaker : public Maker {
   }
 
   /// The text of what is under a layer. returns  its sums
-  Result<formats::MoveTotals> raft_of(std::uint32_t layer, const Sections::Work& work, Buffer<char>& text) const {
-    if (layer > 0) return formats::MoveTotals();
-    return append_raft(plan_, file_, work.contours.contours, text);
+  Result<std::vector<formats::MoveTotals>> raft_of(std::uint32_t layer, const Sections::Work& work, Buffer<char>& text) const {
+    if (layer > 0) return std::vector<formats::MoveTotals>();
+    return append_raft(plan_, file_, work.contours.contours, progress_, text);
   }
-  void add_before(const formats::MoveTotals& raft, PathFacts& facts) const {
-    if (raft.moves == 0) return;
-    file_.travel_from(raft, facts.totals);
-    formats::MoveTotals all = raft;
+  void add_before(const std::vector<formats::MoveTotals>& raft, PathFacts& facts) const {
+    if (raft.empty()) return;
+    file_.travel_from(raft.back(), facts.totals);
+    formats::MoveTotals all;
+    for (const formats::MoveTotals& of : raft) all.add(of);
     all.add(facts.totals);
     facts.totals = all;
+  }
+  Result<std::vector<double>> seconds_of_raft() const {
+    std::vector<double> seconds;
+    if (file_.raft().layers.empty()) return seconds;
+    Sections::Work work;
+    if (Status status = plan_.sections->contours(0, work); !status) return status.error();
+    Buffer<char> text;
+    const auto raft = raft_of(0, work, text);
+    if (!raft) return raft.error();
+    for (const formats::MoveTotals& of : *raft) seconds.push_back(of.seconds);
+    return seconds;
   }
 
   /// The time of a layer, which is planned and dropped for it. errors  of its steps
@@ -471,14 +485,11 @@ class MoveMaker : public Maker {
     if (Status status = plan_.sections->layer(layer, work); !status) return status.error();
     Buffer<char> text;
     PathFacts facts;
-    const auto raft = raft_of(layer, work, text);
-    if (!raft) return raft.error();
     const TravelRegion region(plan_, work);
     const auto out = file_.layer(plan_.layer(layer), text, region.surroundings({}));
     const auto drop = [&] { return text.clear(), true; };
     const auto deposited = deposit_moves(plan_, layer, work, {text, kPieceOfText, drop}, *out, facts);
     if (!deposited) return deposited.error();
-    add_before(*raft, facts);
     formats::MoveTotals with_travel = facts.totals;  // from the layer below: as long as one from this layer's end to its start
     file_.travel_from(facts.totals, with_travel);
     return with_travel.seconds;

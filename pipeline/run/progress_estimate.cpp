@@ -43,10 +43,11 @@ Result<std::vector<double>> time_of_layers(const std::vector<std::uint32_t>& lay
 
 }  // namespace
 
-Result<ProgressEstimate> ProgressEstimate::make(std::uint32_t first, std::uint32_t end,
+Result<ProgressEstimate> ProgressEstimate::make(std::uint32_t first, std::uint32_t end, const std::vector<double>& raft,
                                                 const std::function<Result<double>(std::uint32_t)>& seconds_of) {
   ProgressEstimate estimate;
   estimate.first_ = first;
+  estimate.raft_ = static_cast<std::uint32_t>(raft.size());
   if (end <= first) return estimate;
   const std::vector<std::uint32_t> layers = sampled(end - first);
   auto sample = time_of_layers(layers, first, seconds_of);
@@ -59,15 +60,16 @@ Result<ProgressEstimate> ProgressEstimate::make(std::uint32_t first, std::uint32
       seconds[between] = std::lerp(seconds[before], seconds[at], static_cast<double>(between - before) / (at - before));
   }
   estimate.over_.push_back(0);
+  seconds.insert(seconds.begin(), raft.begin(), raft.end());
   for (const double of : seconds) estimate.over_.push_back(estimate.over_.back() + of);
   return estimate;
 }
 
-std::optional<formats::LayerSurroundings::Progress> ProgressEstimate::before(std::uint32_t layer) const {
+std::optional<ProgressEstimate::Progress> ProgressEstimate::at(std::uint32_t layer) const {
   if (over_.empty()) return std::nullopt;
-  const double over = over_[layer - first_], all = over_.back();
-  return formats::LayerSurroundings::Progress{layer - first_ + 1, all > 0 ? static_cast<int>(100 * over / all) : 0,
-                                              static_cast<int>(std::lround((all - over) / 60))};
+  const double over = over_[layer], all = over_.back();
+  return Progress{layer + 1, all > 0 ? static_cast<int>(100 * over / all) : 0,
+                  static_cast<int>(std::lround((all - over) / 60))};
 }
 
 }  // namespace lamina::pipeline

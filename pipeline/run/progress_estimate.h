@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "stages/data/status.h"
@@ -19,17 +20,23 @@ class ProgressEstimate {
 
   ProgressEstimate() = default;
   /// first, end   layers of the file
+  /// raft         s, of the layers of a raft, which come before
   /// seconds_of   the time of a layer; called by many threads at once
   /// errors       of seconds_of
-  static Result<ProgressEstimate> make(std::uint32_t first, std::uint32_t end,
+  static Result<ProgressEstimate> make(std::uint32_t first, std::uint32_t end, const std::vector<double>& raft,
                                        const std::function<Result<double>(std::uint32_t)>& seconds_of);
 
-  /// At the start of a layer; none if nothing was estimated.
-  std::optional<formats::LayerSurroundings::Progress> before(std::uint32_t layer) const;
+  using Progress = formats::LayerSurroundings::Progress;
+  /// At the start of a layer, of the raft or else of the parts; none if nothing was estimated.
+  std::optional<Progress> before_raft(std::uint32_t layer) const { return at(layer); }
+  std::optional<Progress> before(std::uint32_t layer) const { return at(raft_ + layer - first_); }
 
  private:
-  std::uint32_t first_ = 0;
-  std::vector<double> over_;  // s, before each layer and after the last
+  /// layer  of the file, from 0
+  std::optional<Progress> at(std::uint32_t layer) const;
+
+  std::uint32_t first_ = 0, raft_ = 0;
+  std::vector<double> over_;  // s, before each layer of the file and after the last
 };
 
 }  // namespace lamina::pipeline

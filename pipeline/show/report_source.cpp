@@ -1,3 +1,4 @@
+#include "pipeline/job/file.h"
 #include "pipeline/show/report_source.h"
 
 #include <fmt/format.h>
@@ -154,16 +155,19 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
   }
   auto opened = formats::GcodeFile::open(path);
   if (!opened) return opened.error();
-  if (opened->count() != manifest.layers.size()) {
-    return wrong(path, fmt::format("has {} layers, its manifest {}", opened->count(), manifest.layers.size()));
+  Job job;
+  if (Status status = read_job_text(manifest.head.job_toml, "manifest.json", job); !status) return status.error();
+  const std::uint32_t raft = job.extrude.raft_layers;  // below the layers of the manifest
+  if (opened->count() != raft + manifest.layers.size()) {
+    return wrong(path, fmt::format("has {} layers, its manifest {}", opened->count(), raft + manifest.layers.size()));
   }
   const auto file = std::make_shared<const formats::GcodeFile>(std::move(*opened));
   source.box = file->box();
   source.grid = raster::bead_grid(source.box);
   std::vector<double> seconds;
   for (const LayerRecord& record : manifest.layers) seconds.push_back(record.paths ? record.paths->totals.seconds : 0);
-  source.layer = [file, grid = source.grid, seconds](std::uint32_t position, bool) -> Result<ReportLayer> {
-    const auto layer = file->layer(position);
+  source.layer = [file, raft, grid = source.grid, seconds](std::uint32_t position, bool) -> Result<ReportLayer> {
+    const auto layer = file->layer(raft + position);
     if (!layer) return layer.error();
     raster::BeadRaster beads(grid);
     beads.add(layer->beads, {file->box().lo.x, file->box().lo.y});

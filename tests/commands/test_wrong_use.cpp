@@ -13,6 +13,8 @@
 namespace lamina::test {
 namespace {
 
+using Words = std::vector<std::string>;
+
 void append(std::string& bytes, std::uint32_t value, int count) {
   for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
 }

@@ -46,14 +46,14 @@ TEST(Brim, HasNoLoopInHolesAndOneAroundNeighbours) {
   EXPECT_EQ(infill::brim_around(two, kBrimSettings, kBrimBed)->size(), 15u);
 }
 
-// Around an island 3 mm from the edge of its hole, loops meet half-way: 4 are nearer than 1.5 mm.
+// Around an island 3 mm from the edge of its hole, 8 loops are half a pitch or more away from that edge.
 TEST(Brim, HasLoopsAroundIslandsInHoles) {
   const Contours target = contours_of({{{50, 50}, {70, 50}, {70, 70}, {50, 70}},
                                        {{55, 55}, {55, 65}, {65, 65}, {65, 55}},
                                        {{58, 58}, {62, 58}, {62, 62}, {58, 62}}});
   const auto brim = infill::brim_around(target, kBrimSettings, kBrimBed);
   ASSERT_TRUE(brim.ok());
-  EXPECT_EQ(brim->size(), 18u);
+  EXPECT_EQ(brim->size(), 22u);
   double length = 0;
   for (std::uint32_t c = 0; c < brim->size(); ++c) {
     const auto loop = (*brim)[c];
@@ -64,8 +64,25 @@ TEST(Brim, HasLoopsAroundIslandsInHoles) {
       length += std::hypot(mm(std::int64_t{loop[i].x} - loop[i - 1].x), mm(std::int64_t{loop[i].y} - loop[i - 1].y));
   }
   double expected = 0;
-  for (int k = 0; k < 4; ++k) expected += 4 * (4 + 2 * (k + 0.5) * 0.35708);
+  for (int k = 0; k < 8; ++k) expected += 4 * (4 + 2 * (k + 0.5) * 0.35708);
   EXPECT_NEAR(length, expected, 0.01);
+}
+
+// 0.6 mm from one side of a hole of 22 mm: loops are open lines there, and go on for 3 mm on the others.
+TEST(Brim, EndsAtTheEdgeOfAHole) {
+  const Contours target = contours_of({{{50, 50}, {80, 50}, {80, 80}, {50, 80}},
+                                       {{54, 54}, {54, 76}, {76, 76}, {76, 54}},
+                                       {{54.6, 63}, {58.6, 63}, {58.6, 67}, {54.6, 67}}});
+  const auto brim = infill::brim_around(target, {3 * kMm, 400'000, 357'080}, kBrimBed);
+  ASSERT_TRUE(brim.ok());
+  EXPECT_EQ(brim->size(), 16u) << "8 around the plate, 8 around the island";
+  Nm right = 0;
+  for (std::uint32_t c = 0; c < brim->size(); ++c) {
+    const auto loop = (*brim)[c];
+    if (std::ranges::min(loop, {}, &Point2::x).x < 54 * kMm) continue;
+    right = std::max(right, std::ranges::max(loop, {}, &Point2::x).x);
+  }
+  EXPECT_NEAR(mm(right), 58.6 + 7.5 * 0.35708, 1e-5);
 }
 
 TEST(Brim, IsWithinTheBed) {

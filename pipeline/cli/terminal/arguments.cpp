@@ -114,13 +114,13 @@ constexpr SlicerAlias kSlicerAliases[] = {
     {"--rotate", "--rotate-x --rotate-y --rotate-z", "three angles, about x, y and z: X,Y,Z"},
     {"--skirt", "--skirts --skirt-line-count"},
     {"--brim", "--brim-width"},
+    {"--raft", "--raft-layers"},
     {"--job", "--load"},
     {"--save-job", "--save"},
     {"--machine", "--printer --printer-profile"},
     {"--output", "--output-dir"},
     {"--quiet", "--loglevel"},
     {"", "--support --supports --support-material --support-enable", "lamina makes no supports"},
-    {"", "--raft --raft-layers", "lamina makes no raft"},
 };
 
 /// The option's names, and those of other slicers that no option of the command has.

@@ -148,14 +148,14 @@ void ContainmentTest::set_inner(const ContoursView& inner) {
 bool ContainmentTest::certainly_in(const ContoursView& outer) {
   if (inner_.size() == 0) return true;
   if (outer.size() == 0 || inner_bands_.is_crowded()) return false;
+  outer_bands_.build(outer, 1);
+  if (outer_bands_.is_crowded()) return false;
   for (std::uint32_t c = 0; c < outer.size(); ++c) {
     const std::span<const Point2> points = outer[c];
     if (inner_bands_.inside(points.front())) return false;
     for (std::size_t i = 0; i < points.size(); ++i)
       if (inner_bands_.meets(points[i], points[i + 1 < points.size() ? i + 1 : 0])) return false;
   }
-  outer_bands_.build(outer, 1);
-  if (outer_bands_.is_crowded()) return false;
   for (std::uint32_t c = 0; c < inner_.size(); ++c)
     if (!outer_bands_.inside(inner_[c].front())) return false;
   return true;

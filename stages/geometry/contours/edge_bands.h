@@ -74,7 +74,7 @@ class ContainmentTest {
   /// outer    clean contours
   /// returns  true if all edges keep clear of each other and the inner region is within the outer one. false: it may not be, or
   ///          too many edges are next to each other
-  /// cost     O(P) times the edges of a band, of which there are at most 256 on average
+  /// cost     O(P) times the edges of the bands that an edge reaches; of a band there are at most 256 on average
   bool certainly_in(const ContoursView& outer);
 
  private:
