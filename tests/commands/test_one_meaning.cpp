@@ -254,11 +254,11 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"report beads.gcode --parts part.stl -o a.html", "--parts: is of jobs of images"},
       {"preview beads.gcode --layer 2 --width 500 -o a.svg", "--width: applies to pictures of pixels"},
       {"slice part.stl --dry-run --layer 1 --pattern contour --angle 30", "--angle: applies to lines with a direction"},
-      {"extrude part.stl --machine fdm-2000 --layer 0.254 --machine-set fan.percent=50", "fan.percent: is not in SML"},
-      {"extrude part.stl --raft-gap 0.2", "--raft-gap: applies to a raft"},
-      {"extrude part.stl --raft 2 --elephant-foot 0.2", "--elephant-foot: applies to parts on the bed"},
-      {"extrude part.stl --machine fdm-2000 --layer 0.254 --machine-set material.bed_degc=50", "bed_degc: is not in SML"},
-      {"extrude part.stl --machine-set sml.height=x", "sml.height: is not in G-code"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --machine-set fan.percent=50", "fan.percent: is not in SML"},
+      {"extrude part.stl --dry-run --raft-gap 0.2", "--raft-gap: applies to a raft"},
+      {"extrude part.stl --dry-run --raft 2 --elephant-foot 0.2", "--elephant-foot: applies to parts on the bed"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --machine-set material.bed_degc=50", "bed_degc: is not in SML"},
+      {"extrude part.stl --dry-run --machine-set sml.height=x", "sml.height: is not in G-code"},
       {"manual jet -o pages", "--output: is for the pages of all commands"},
   };
   for (const auto& row : rows) {

@@ -104,7 +104,7 @@ TEST(SlicerAliases, OfOtherSlicersAreAnsweredWithOurs) {
       {"extrude", "--support", "lamina makes no supports"},
       {"jet", "--support_material", "lamina makes no supports"},
       {"extrude", "--brim-width", "'--brim'"},
-      {"extrude", "--raft-layers", "lamina makes no raft"},
+      {"extrude", "--raft-layers", "'--raft'"},
   };
   for (const auto& row : rows) EXPECT_NE(requested(row.command, row.flag).find(row.ours), std::string::npos) << row.flag;
   EXPECT_EQ(requested("info", "--layer-height"), "") << "info has no layers";
