@@ -19,7 +19,9 @@ RaftPlan plan_raft(const ExtrudeRequest& request, Nm thickness) {
 
 Status check_raft(const Job& job, const Extruder& machine) {
   if (job.extrude.raft_layers == 0) return {};
-  const auto refused = [](const char* why) { return Error{Fault::kUsage, std::string("extrude.raft_layers (--raft): ") + why}; };
+  const auto refused = [](const char* why) {
+    return Error{Fault::kUsage, std::string("extrude.raft_layers (--raft): ") + why};
+  };
   if (machine.format == "sml") return refused("a machine of SML deposits its own foundation; leave it out");
   if (job.extrude.brim_mm > 0) return refused("a raft is its own brim; leave out extrude.brim_mm (--brim)");
   if (job.heights.per_part) return refused("with --per-part each part has its own first layer; leave one of them out");

@@ -86,8 +86,7 @@ Status deposit_around(const Plan& plan, const Layer& layer, const ContoursView& 
   Result<Contours> printed = Contours();
   if (foot > 0) printed = infill::without_elephant_foot(contours, foot, width);
   if (!printed) return printed.error();
-  const auto brim =
-      infill::brim_around(foot > 0 ? ContoursView(*printed) : contours, {reach, width, pitch}, bed_of(machine));
+  const auto brim = infill::brim_around(foot > 0 ? ContoursView(*printed) : contours, {reach, width, pitch}, bed_of(machine));
   if (!brim) return brim.error();
   AuxiliaryBeads(plan, layer, PathKind::kSkirt, PathKind::kOuter, out).add(*brim, width);
   return {};
@@ -108,7 +107,8 @@ Result<std::vector<formats::MoveTotals>> append_raft(const Plan& plan, const Too
     own.width = own.wall_width = layer.index == 0 ? first_width(plan) : static_cast<Nm>(nm_of(plan.job.fill.all.width_mm));
     own.nominal_thickness = layer.thickness;
     Toolpaths paths;
-    if (Status status = infill::append_raft(*region, layer, static_cast<std::uint32_t>(raft.layers.size()), own, paths); !status)
+    if (Status status = infill::append_raft(*region, layer, static_cast<std::uint32_t>(raft.layers.size()), own, paths);
+        !status)
       return status.error();
     const auto out = file.raft_layer(layer, text, progress.before_raft(layer.index));
     if (layer.index == 0) deposit_skirt(plan, layer, margin, *out);

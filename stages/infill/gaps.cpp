@@ -443,7 +443,8 @@ struct Island {
 
 void append_islands(const ContoursView& region, std::vector<Island>& islands) {
   for_each_island(region, [&](std::uint32_t first, std::uint32_t end, double) {
-    append_range(region, first, end, islands.emplace_back(Contours(), bound_radius(region[first])).contours);
+    islands.push_back({Contours(), bound_radius(region[first])});
+    append_range(region, first, end, islands.back().contours);
   });
 }
 
