@@ -33,6 +33,8 @@ struct Kind {
   std::int64_t height = 0;
 };
 
+constexpr std::uint32_t kPictureCells = 4;  // of the bed, along a cell of a picture
+
 using KindName = std::tuple<std::string, char, bool>;
 KindName kind_of(const OrderRow& row) { return {row.path, row.down_axis, row.down_positive}; }
 
@@ -113,6 +115,7 @@ class Nester {
   Status put_fixed(const std::vector<std::uint32_t>& rows, NestBuild& build, std::vector<arrange::FixedShape>& fixed);
   Status nest_material(const std::string& material, NestPlan& plan);
   void add_copy(std::uint32_t row, MicroDegrees turn, double x_mm, double y_mm, NestBuild& build);
+  std::uint32_t picture_of(std::uint32_t row, MicroDegrees turn, const arrange::BitShape& shape);
 
   const std::vector<OrderRow>& rows_;
   const NestSpace& space_;
@@ -123,6 +126,8 @@ class Nester {
   std::map<std::tuple<KindName, MicroDegrees, std::int64_t>, std::uint32_t> shape_number_;
   std::map<std::string, std::vector<std::uint32_t>> of_material_;  // rows that may fit
   std::vector<std::uint32_t> next_copy_;
+  std::vector<arrange::BitShape> pictures_;
+  std::map<std::pair<KindName, MicroDegrees>, std::uint32_t> picture_number_;
 };
 
 /// The shape of a row in a turn, with its own distance to others.
@@ -157,11 +162,20 @@ std::string Nester::why_not(std::uint32_t row) const {
                      turns.size());
 }
 
+/// The picture of a row in a turn, in cells four times as large.
+std::uint32_t Nester::picture_of(std::uint32_t row, MicroDegrees turn, const arrange::BitShape& shape) {
+  const auto [known, fresh] =
+      picture_number_.try_emplace({kind_of(rows_[row]), turn}, static_cast<std::uint32_t>(pictures_.size()));
+  if (fresh) pictures_.push_back(arrange::coarse_shape(shape, kPictureCells));
+  return known->second;
+}
+
 void Nester::add_copy(std::uint32_t row, MicroDegrees turn, double x_mm, double y_mm, NestBuild& build) {
   const Kind& own = kind(row);
   const auto fixed = own.fixed.find(row);
   const arrange::Shadow& shadow = fixed != own.fixed.end() ? fixed->second : own.shadows.at(turn);
-  build.copies.push_back({row, next_copy_[row]++, x_mm, y_mm, mm(shadow.width), mm(shadow.depth), mm(shadow.height), turn});
+  build.copies.push_back({row, next_copy_[row]++, x_mm, y_mm, mm(shadow.width), mm(shadow.depth), mm(shadow.height), turn,
+                          picture_of(row, turn, shadow.shape)});
   build.height_mm = std::max(build.height_mm, mm(shadow.height));
   build.area_mm2 += shadow.area_mm2;
   build.volume_mm3 += own.volume_mm3;
@@ -250,6 +264,10 @@ Result<NestPlan> Nester::run() {
     if (Status status = nest_material(material, plan); !status) return status.error();
   }
   std::ranges::sort(plan.left_out, {}, &LeftOut::row);
+  plan.pictures = std::move(pictures_);
+  plan.picture_cell_mm = mm(bed_.cell * kPictureCells);
+  plan.bed_mm = {mm(space_.bed.width), mm(space_.bed.depth)};
+  plan.round = space_.bed.round;
   return plan;
 }
 

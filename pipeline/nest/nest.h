@@ -3,6 +3,7 @@
 //   rows ─> kinds (files in a resting position) ─> shadows by turn ─> builds, level by level
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -30,6 +31,7 @@ struct NestedCopy {
   double x_mm = 0, y_mm = 0;        // lower corner of its box on the bed
   double width_mm = 0, depth_mm = 0, height_mm = 0;
   MicroDegrees turn = 0;
+  std::uint32_t picture = 0;  // of NestPlan::pictures
 };
 
 struct NestBuild {
@@ -51,6 +53,11 @@ struct NestPlan {
   std::vector<LeftOut> left_out;
   double bed_mm2 = 0;  // without margin and keep-outs
   std::uint32_t kinds = 0;
+  // --- for drawing
+  std::array<double, 2> bed_mm{0, 0};
+  bool round = false;
+  std::vector<arrange::BitShape> pictures;  // what parts cover, in larger cells
+  double picture_cell_mm = 0;
 };
 
 /// Rows of higher priority come first, then those that are due earlier; of equal ones several orders by size are tried, and the

@@ -9,6 +9,7 @@
 
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
+#include "pipeline/nest/sheet.h"
 #include "pipeline/report/job_cost.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/number_text.h"
@@ -31,20 +32,24 @@ Status write_text(const fs::path& path, const std::string& text) {
   return written ? Status() : Status(written.error());
 }
 
-/// Removes the builds of an earlier nesting. errors  kUsage, kOutput
-Status prepare_directory(const fs::path& directory, bool overwrite) {
+fs::path build_folder(const fs::path& directory, std::size_t build) { return directory / fmt::format("build-{}", build + 1); }
+
+/// Removes builds from `first` on, up to a number that is not there; folders stay if others have files in them.
+void remove_builds(const fs::path& directory, std::size_t first) {
+  std::error_code error;
+  for (std::size_t b = first; fs::exists(build_folder(directory, b), error); ++b) {
+    for (const char* name : {"plate.toml", "parts.csv", "sheet.html"}) fs::remove(build_folder(directory, b) / name, error);
+    fs::remove(build_folder(directory, b), error);
+  }
+}
+
+/// errors  kUsage: the directory has builds already; kOutput
+Status make_directory(const fs::path& directory, bool overwrite) {
   std::error_code error;
   if (fs::exists(directory, error) && !fs::is_directory(directory, error))
     return usage("-o {}: is a file; name a directory", directory.string());
-  std::vector<fs::path> earlier;
-  for (std::uint32_t i = 1; fs::exists(directory / fmt::format("build-{}", i), error); ++i)
-    earlier.push_back(directory / fmt::format("build-{}", i));
-  if (!overwrite && (!earlier.empty() || fs::exists(directory / "orders.csv", error)))
+  if (!overwrite && (fs::exists(build_folder(directory, 0), error) || fs::exists(directory / "orders.csv", error)))
     return usage("-o {}: has builds already; replace them with --overwrite, or name another directory", directory.string());
-  for (const fs::path& build : earlier) {
-    for (const char* name : {"plate.toml", "parts.csv"}) fs::remove(build / name, error);
-    fs::remove(build, error);  // unless others have files in it
-  }
   fs::create_directories(directory, error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory.string(), error.message())};
   return {};
@@ -126,22 +131,50 @@ std::vector<std::vector<std::string>> serial_numbers(const std::vector<OrderRow>
   return serials;
 }
 
+namespace {
+
+/// A build's job, its parts and its sheet. errors  kOutput
+Status write_build(const fs::path& folder, const SheetHead& head, const NestPlan& plan, const NestBuild& build,
+                   const OrderTable& table, const std::vector<std::vector<std::string>>& serials, const Job& options,
+                   std::string_view command) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", folder.string(), error.message())};
+  const std::string job = (folder / "plate.toml").string();
+  Status status = save_job(job, plate_of(build, table.rows, options), command);
+  if (status) status = write_text(folder / "parts.csv", cost::csv_text(parts_table(build, table, serials)));
+  if (!status) return status;
+  const auto job_file = digest_file(job);
+  if (!job_file) return job_file.error();
+  SheetHead whole = head;
+  whole.hash = hex(job_file->hash);
+  return write_text(folder / "sheet.html", sheet_html(whole, plan, build, table.rows, serials));
+}
+
+}  // namespace
+
 Status write_nest(const std::string& directory, bool overwrite, const NestPlan& plan, const OrderTable& table,
-                  const Job& options, std::string_view command) {
-  if (Status status = prepare_directory(directory, overwrite); !status) return status;
+                  const Job& options, std::string_view command, const std::string& machine) {
+  if (Status status = make_directory(directory, overwrite); !status) return status;
+  // Begun first and finished last: it is the claim of the directory.
+  auto orders = File::open((fs::path(directory) / "orders.csv").string(), {.replace = overwrite});
+  if (!orders) return orders.error();
+  remove_builds(directory, 0);
   const auto serials = serial_numbers(table.rows);
-  for (std::size_t b = 0; b < plan.builds.size(); ++b) {
-    const fs::path folder = fs::path(directory) / fmt::format("build-{}", b + 1);
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error) return Error{Fault::kOutput, fmt::format("{}: {}", folder.string(), error.message())};
-    const NestBuild& build = plan.builds[b];
-    if (Status status = save_job((folder / "plate.toml").string(), plate_of(build, table.rows, options), command); !status)
-      return status;
-    if (Status status = write_text(folder / "parts.csv", cost::csv_text(parts_table(build, table, serials))); !status)
-      return status;
+  std::error_code error;
+  const std::string name = fs::weakly_canonical(directory, error).filename().string();
+  Status status = orders->append(cost::csv_text(orders_table(plan, table, serials)));
+  for (std::size_t b = 0; b < plan.builds.size() && status; ++b) {
+    const SheetHead head{fmt::format("{}, build {} of {}", name, b + 1, plan.builds.size()), machine, {}};
+    status = write_build(build_folder(directory, b), head, plan, plan.builds[b], table, serials, options, command);
   }
-  return write_text(fs::path(directory) / "orders.csv", cost::csv_text(orders_table(plan, table, serials)));
+  if (status) {
+    const auto written = orders->finish();
+    if (written) return {};
+    status = written.error();
+  }
+  remove_builds(directory, 0);
+  return status;
 }
 
 Summary::Lines nest_lines(const NestPlan& plan, const OrderTable& table) {

@@ -14,11 +14,11 @@ namespace lamina::pipeline {
 /// Serial numbers of a row's copies: ORDER-001, or FILE-001 without an order; counted over all rows of one order.
 std::vector<std::vector<std::string>> serial_numbers(const std::vector<OrderRow>& rows);
 
-/// Writes DIR/build-1/{plate.toml, parts.csv}, ... and DIR/orders.csv. plate.toml is a job of `command`, with the settings of
-/// `options`.
-/// errors  kUsage: the directory has files and `overwrite` is not set; kOutput
+/// Writes DIR/build-1/{plate.toml, parts.csv, sheet.html}, ... and DIR/orders.csv. plate.toml is a job of `command`, with the
+/// settings of `options`. machine  its name, for the sheets errors  kUsage: the directory has files and `overwrite` is not set;
+/// kOutput
 Status write_nest(const std::string& directory, bool overwrite, const NestPlan& plan, const OrderTable& table,
-                  const Job& options, std::string_view command);
+                  const Job& options, std::string_view command, const std::string& machine);
 
 Summary::Lines nest_lines(const NestPlan& plan, const OrderTable& table);
 Json nest_json(const NestPlan& plan, const OrderTable& table);

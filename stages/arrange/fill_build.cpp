@@ -22,13 +22,18 @@ class Filling {
   }
 
   void fill(const std::vector<std::uint32_t>& order) {
-    for (const std::uint32_t number : order) {
-      const Demand& demand = demands_[number];
+    // The more demands in a row find no position, the more of the next ones are left to the next level.
+    constexpr std::size_t kPatience = 16;
+    std::size_t failures = 0;
+    for (std::size_t i = 0; i < order.size(); i += 1 + failures / kPatience) {
+      const Demand& demand = demands_[order[i]];
+      const std::size_t before = put.size();
       if (!demand.group) {
-        put_copies(number);
+        put_copies(order[i]);
       } else if (tried_.insert(*demand.group).second) {
         put_group(order, *demand.group);
       }
+      failures = put.size() > before ? 0 : failures + 1;
     }
   }
 

@@ -41,7 +41,7 @@ struct FixedShape {
 };
 
 /// Fills a level in four orders of demands of equal rank, by area, depth, width, and as they come; keeps the one that covers
-/// most, of the first rank in which they differ.
+/// most, of the first rank in which they differ. Where more than 16 demands in a row find no position, some are not tried.
 ///
 /// fixed    are in the level already
 /// returns  in the order in which they were put

@@ -150,6 +150,15 @@ Shadow shadow_of(std::span<const Mesh> meshes, std::span<const Instance> instanc
   return shadow;
 }
 
+BitShape coarse_shape(const BitShape& shape, std::uint32_t factor) {
+  BitShape coarse(ceil_div(shape.width, factor), ceil_div(shape.depth, factor));
+  for (std::uint32_t y = 0; y < shape.depth; ++y) {
+    for (std::uint32_t x = 0; x < shape.width; ++x)
+      if (shape.at(x, y)) coarse.set(y / factor, x / factor, x / factor + 1);
+  }
+  return coarse;
+}
+
 GrownShape grown_shape(const BitShape& shape, std::int64_t gap, std::int64_t cell) {
   GrownShape grown;
   // Cells (dx, dy) away from each other are max(|dx| - 1, 0), max(|dy| - 1, 0) cells apart.

@@ -48,6 +48,9 @@ struct Shadow {
 Shadow shadow_of(std::span<const Mesh> meshes, std::span<const Instance> instances, MicroDegrees turn, std::int64_t cell,
                  std::array<std::int64_t, 2> phase = {0, 0});
 
+/// A shape in cells `factor` times as large: set where any of theirs is.
+BitShape coarse_shape(const BitShape& shape, std::uint32_t factor);
+
 /// A shape and all cells that may be nearer to it than a gap, in nm: larger by the result's `reach` on each side.
 struct GrownShape {
   BitShape shape;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "stages/support/hash/hash.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -95,6 +96,91 @@ TEST_F(Nesting, EveryPartIsInOneBuildOrReported) {
   EXPECT_EQ(copies["1003"], 4);
 }
 
+/// What parts cover in any layer of a job, as a picture of bytes with the number of each connected piece.
+class CoveredPixels {
+ public:
+  explicit CoveredPixels(const std::string& folder) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) add(read_text(entry.path()));
+    std::uint32_t number = 0;
+    for (std::size_t at = 0; at < piece.size(); ++at)
+      if (piece[at] == kSet) flood(at, ++number);
+    boundaries.resize(number);
+    for (std::size_t at = 0; at < piece.size(); ++at) {
+      const std::size_t x = at % width, y = at / width;
+      if (piece[at] == 0) continue;
+      EXPECT_TRUE(x > 0 && y > 0 && x + 1 < width && y + 1 < height);
+      if (piece[at - 1] && piece[at + 1] && piece[at - width] && piece[at + width]) continue;
+      boundaries[piece[at] - 1].push_back({static_cast<double>(x), static_cast<double>(y)});
+    }
+  }
+  std::size_t width = 0, height = 0;
+  std::vector<std::uint32_t> piece;
+  std::vector<std::vector<std::pair<double, double>>> boundaries;  // pixels
+
+ private:
+  static constexpr std::uint32_t kSet = UINT32_MAX;
+  void add(const std::string& pbm) {
+    const std::size_t comment = pbm.find('#'), after = comment < 8 ? pbm.find('\n', comment) : 2;
+    std::istringstream head(pbm.substr(after, 64));
+    head >> width >> height;
+    const std::size_t row = (width + 7) / 8, begin = pbm.size() - row * height;
+    piece.resize(width * height);
+    for (std::size_t y = 0; y < height; ++y) {
+      for (std::size_t b = 0; b < row; ++b) {
+        const auto byte = static_cast<unsigned char>(pbm[begin + y * row + b]);
+        for (std::size_t x = 8 * b; byte != 0 && x < std::min(width, 8 * b + 8); ++x)
+          if ((byte >> (7 - x % 8) & 1) != 0) piece[y * width + x] = kSet;
+      }
+    }
+  }
+  void flood(std::size_t from, std::uint32_t number) {
+    std::vector<std::size_t> open{from};
+    piece[from] = number;
+    while (!open.empty()) {
+      const std::size_t at = open.back();
+      open.pop_back();
+      for (const std::size_t next : {at - 1, at + 1, at - width, at + width}) {
+        if (piece[next] != kSet) continue;
+        piece[next] = number;
+        open.push_back(next);
+      }
+    }
+  }
+};
+
+// Distances between the pixels that two parts cover, at 600 dpi, on the round bed.
+TEST_F(Nesting, NoTwoPartsAreNearerThanTheGap) {
+  const std::string crown = corpus_file("dental_crown.stl");
+  ASSERT_EQ(
+      run("nest " + crown + " --copies 99 --machine nuferbj --margin 2 --gap 5 --turns 0,25,90,200 --builds 1 -o week").code,
+      0);
+  ASSERT_EQ(run("jet " + crown + " --machine nuferbj --copies 18 --layer 0.3 --dry-run").code, 0) << "so many fit in rows";
+  const std::size_t count = cells_of(text("week/build-1/parts.csv")).size() - 1;
+  EXPECT_GE(count, 24u);
+  // As on a bare bed, whose pixels have 600 dpi.
+  std::string job = text("week/build-1/plate.toml");
+  job.erase(job.find("profile = "), job.find('\n', job.find("profile = ")) - job.find("profile = "));
+  write_text(folder_ / "bare.toml", job);
+  const Outcome made = run("jet --job bare.toml --bed 98x98 --dpi 600 --layer 0.4 --format pbm -o out --quiet");
+  ASSERT_EQ(made.code, 0) << made.err;
+  const CoveredPixels pixels(folder_ / "out/layers");
+  ASSERT_EQ(pixels.boundaries.size(), count) << "each part is one piece";
+  const double pixel_mm = 25.4 / 600, middle = 49 / pixel_mm;
+  double nearest = 1e9;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const auto& [x, y] : pixels.boundaries[i])
+      EXPECT_LE(std::hypot(x + 0.5 - middle, y + 0.5 - middle) * pixel_mm, 47 + pixel_mm) << "the margin";
+    for (std::size_t k = 0; k < i; ++k) {
+      const auto &a = pixels.boundaries[i], &b = pixels.boundaries[k];
+      if (std::hypot(a[0].first - b[0].first, a[0].second - b[0].second) * pixel_mm > 35) continue;
+      for (const auto& [x, y] : a)
+        for (const auto& [u, v] : b) nearest = std::min(nearest, (x - u) * (x - u) + (y - v) * (y - v));
+    }
+  }
+  EXPECT_GE(std::sqrt(nearest) * pixel_mm, 5 - pixel_mm);
+  EXPECT_LE(std::sqrt(nearest) * pixel_mm, 5.5) << "and they are not much further away";
+}
+
 TEST_F(Nesting, IsTheSameForAnyNumberOfThreads) {
   const std::string job = "nest bar.stl cube.stl --copies 20,25 --bed 90x90 --turns 0,30,90 ";
   ASSERT_EQ(run(job + "--threads 1 -o one").code, 0);
@@ -104,6 +190,28 @@ TEST_F(Nesting, IsTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(text(std::string("one/") + name), text(std::string("four/") + name));
     EXPECT_EQ(text(std::string("one/") + name), text(std::string("again/") + name));
   }
+}
+
+TEST_F(Nesting, SheetsHaveEveryPartItsPositionAndTheHashOfTheJob) {
+  write_text(folder_ / "orders.csv", "file,copies,order,customer\nbar.stl,3,1001,Kunze & <Sohn>\ncube.stl,2,1002,\n");
+  ASSERT_EQ(run("nest orders.csv --machine nuferbj -o week").code, 0);
+  const std::string sheet = text("week/build-1/sheet.html");
+  EXPECT_NE(sheet.find(hex(hash_text(text("week/build-1/plate.toml")))), std::string::npos);
+  EXPECT_NE(sheet.find("Kunze &amp; &lt;Sohn&gt;"), std::string::npos);
+  const CsvCells parts = cells_of(text("week/build-1/parts.csv"));
+  ASSERT_EQ(parts.size(), 6u);
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    char row[80];
+    std::snprintf(row, sizeof row, "<span>%.1f, %.1f</span><span>%.1f</span>", std::stod(parts[i][5]), std::stod(parts[i][6]),
+                  std::stod(parts[i][10]));
+    const std::size_t at = sheet.find(parts[i][1]);
+    ASSERT_NE(at, std::string::npos) << parts[i][1];
+    EXPECT_LT(sheet.find(row, at), sheet.find("</div>", at)) << row;
+    EXPECT_NE(sheet.rfind("<b>" + parts[i][0] + "</b>", at), std::string::npos);
+  }
+  // The cubes are 10 mm high, the bars 4: they appear first.
+  EXPECT_LT(sheet.find("(10.0 mm)"), sheet.find("(4.0 mm)"));
+  EXPECT_EQ(sheet.find("<script"), std::string::npos);
 }
 
 TEST_F(Nesting, WhatDoesNotFitIsNamedWithTheReason) {

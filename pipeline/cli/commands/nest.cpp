@@ -32,6 +32,7 @@ CommandSpec nest_spec() {
   spec.operand = "ORDERS|PART";
   spec.operand_meaning = "one CSV file of orders; or STL, OBJ or 3MF files and directories of them, as in bracket_x12.stl";
   add_key_options(kNestKeys, spec);
+  std::erase_if(spec.options, [](const OptionSpec& option) { return option.flag == "--save-job"; });  // builds are jobs
   for (OptionSpec& option : spec.options) {
     if (option.flag != "-o,--output") continue;
     option.value = "DIR";
@@ -48,9 +49,8 @@ CommandSpec nest_spec() {
                        {"--quiet", "", "print errors only", "", "Run"}});
   spec.closing =
       "Examples:\n"
-      "  lamina nest orders.csv --machine production-1200 --preset example-steel -o week\n"
-      "  lamina jet --job week/build-1/plate.toml -o week/build-1/out\n"
-      "  lamina nest crown_x40.stl bracket.obj --copies 1,12 --machine nuferbj -o plates\n"
+      "  lamina nest orders.csv --machine production-1200 -o week\n"
+      "  lamina nest part.stl bracket.stl --copies 40,12 --machine nuferbj -o plates\n"
       "  lamina nest orders.csv --machine marlin --builds 2 --keep-out 0,0,40,30 -o plates\n";
   return spec;
 }
@@ -113,7 +113,7 @@ Result<OrderTable> read_operands(const Arguments& arguments) {
 }
 
 /// The space of a job's machine, or of its bed. errors  kUsage
-Result<NestSpace> space_of(const Job& job, std::string_view& command) {
+Result<NestSpace> space_of(const Job& job, std::string_view& command, std::string& name) {
   auto resolved = resolve(job, Product::kImages);
   command = "jet";
   if (!resolved) {
@@ -128,10 +128,14 @@ Result<NestSpace> space_of(const Job& job, std::string_view& command) {
   space.height = kNmReach;
   if (resolved->printer && resolved->printer->machine) {
     const Machine& machine = resolved->printer->machine->machine;
+    name = machine.name;
     space.bed.round = machine.bed.shape == BedShape::kRound;
     space.height = nm_of(machine.bed.build_height_mm);
   }
-  if (resolved->extruder) space.height = nm_of(resolved->extruder->machine.bed.build_height_mm);
+  if (resolved->extruder) {
+    name = resolved->extruder->machine.name;
+    space.height = nm_of(resolved->extruder->machine.bed.build_height_mm);
+  }
   space.gap = nm_of(job.gap_mm);
   return space;
 }
@@ -171,7 +175,8 @@ Outcome run_nest(const Arguments& arguments, Context& context) {
   }
   if (table->rows.empty()) return Error{Fault::kInput, fmt::format("{}: has no parts", arguments.operands[0])};
   std::string_view command;
-  auto space = space_of(*job, command);
+  std::string machine;
+  auto space = space_of(*job, command, machine);
   if (!space) return space.error();
   if (Status status = read_space_options(arguments, *space); !status) return status;
   std::optional<tbb::global_control> threads;
@@ -179,7 +184,7 @@ Outcome run_nest(const Arguments& arguments, Context& context) {
   const auto plan = nest_orders(table->rows, *space, *job);
   if (!plan) return plan.error();
   if (!arguments.has("--dry-run")) {
-    Status status = write_nest(job->output, arguments.has("--overwrite"), *plan, *table, *job, command);
+    Status status = write_nest(job->output, arguments.has("--overwrite"), *plan, *table, *job, command, machine);
     if (!status) return status;
   }
   if (!arguments.has("--quiet")) context.say_text(text_of(nest_lines(*plan, *table)));
