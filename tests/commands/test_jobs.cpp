@@ -355,11 +355,12 @@ TEST_F(Interrupted, KilledJobsResumeToTheSameBytes) {
 
 TEST_F(Interrupted, SecondRunInTheSameDirectoryIsRefusedAndHarmsNothing) {
   const std::vector<std::string> job = long_job("out");
-  const Outcome first = run_lamina(job, directory_.path(), [&](int) {
+  const Outcome first = run_lamina(job, directory_.path(), [&](int process) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (std::chrono::steady_clock::now() < deadline && files_below(directory_ / "out/layers").size() < 5) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
+    ::kill(process, SIGSTOP);  // on a busy machine it could end before the second one begins
     for (const char* how : {"--resume", "--overwrite"}) {
       std::vector<std::string> second = job;
       second.push_back(how);
@@ -368,6 +369,7 @@ TEST_F(Interrupted, SecondRunInTheSameDirectoryIsRefusedAndHarmsNothing) {
       EXPECT_NE(refused.err.find("another run"), std::string::npos) << refused.err;
       EXPECT_EQ(refused.error_lines(), 1u) << refused.err;
     }
+    ::kill(process, SIGCONT);
   });
   EXPECT_EQ(first.code, 0) << first.err;
   EXPECT_EQ(lamina({"verify", "out"}).code, 0);
