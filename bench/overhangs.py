@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """bench/overhangs.py: overhangs of four parts at three angles, and by boolean operations of GEOS. Writes bench/overhangs.md.
 
-    bench/overhangs.py [LAMINA]      default: build/release/lamina
+    /usr/bin/python3 bench/overhangs.py [LAMINA]     default: build/release/lamina
 
 Targets are areas at very thin layers. A layer's area may differ from them by 3 % and by a strip of width max(w, r) along the edges of the
 overhang; w is a bead of 0.4 mm, r the distance of the sampled planes times the tangent of the angle. GEOS (Debian: python3-shapely)

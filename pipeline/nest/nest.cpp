@@ -154,7 +154,8 @@ std::string Nester::why_not(std::uint32_t row) const {
   const auto fits = [&](MicroDegrees turn) {
     const arrange::Shadow& shadow = own.shadows.at(turn);
     arrange::BedLevel level(bed_, 1);
-    return level.find(0, shadow.shape).has_value();
+    const std::int64_t more = std::max<std::int64_t>(0, nm_of(rows_[row].keep_apart_mm) - space_.gap);
+    return level.find(0, arrange::grown_shape(shadow.shape, more, bed_.cell).shape).has_value();
   };
   if (std::ranges::any_of(turns, fits)) return {};
   const arrange::Shadow& shadow = own.shadows.at(turns.front());
@@ -236,13 +237,13 @@ Status Nester::nest_material(const std::string& material, NestPlan& plan) {
     if (build.copies.empty()) break;
     plan.builds.push_back(std::move(build));
   }
-  const bool full = plan.builds.size() >= space_.max_builds;
+  const std::string full =
+      fmt::format("no space in {} build{} (--builds)", space_.max_builds, space_.max_builds == 1 ? "" : "s");
+  for (const std::uint32_t row : fixed_rows) plan.left_out.push_back({row, rows_[row].copies, full});
   for (const arrange::Demand& demand : demands) {
     if (demand.copies == 0) continue;
-    plan.left_out.push_back(
-        {demand.row, demand.copies,
-         full ? fmt::format("the {} build{} requested are full", space_.max_builds, space_.max_builds == 1 ? "" : "s")
-              : fmt::format("its group '{}' does not fit one build", rows_[demand.row].group)});
+    const std::string of_group = fmt::format("its group '{}' does not fit one build", rows_[demand.row].group);
+    plan.left_out.push_back({demand.row, demand.copies, plan.builds.size() >= space_.max_builds ? full : of_group});
   }
   return {};
 }

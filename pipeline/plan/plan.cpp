@@ -232,7 +232,7 @@ class Planner {
     }
     const auto bottom = [](const PartSummary& part) { return part.bounds.lo.z; };
     if (const Nm lowest = std::ranges::min(plan_.scene->parts, {}, bottom).bounds.lo.z; raft.lift > 0 && lowest > 0)
-      return usage("extrude.raft_layers (--raft): the parts begin {:g} mm above the bed; put one of them on it", mm(lowest));
+      return usage("extrude.raft_layers (--raft): the parts begin {:g} mm above the bed; move one of them down to it", mm(lowest));
     const auto format = formats::make_extrusion_format(machine);
     for (const Layer& layer : raft.layers) {
       if (Status status = format->check(layer); !status) return status;

@@ -302,7 +302,7 @@ class BeadObserver : public MoveObserver {
                                          totals.auxiliary_filament_mm);
     if (request.raft_layers > 0) {
       const RaftPlan raft = plan_raft(request, plan_.sections->layers().front().layer.thickness);
-      summary.results.emplace_back("raft", fmt::format("{} layer{}, {:g} mm to the parts with a gap of {:g} mm; {}",
+      summary.results.emplace_back("raft", fmt::format("{} layer{}, {:g} mm high with its gap of {:g} mm; {}",
                                                        request.raft_layers, request.raft_layers > 1 ? "s" : "", mm(raft.lift),
                                                        request.raft_gap_mm, text));
     } else if (request.brim_mm > 0) {

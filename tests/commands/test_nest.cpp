@@ -226,7 +226,22 @@ TEST_F(Nesting, WhatDoesNotFitIsNamedWithTheReason) {
   EXPECT_NE(left[1].at("reason").get<std::string>().find("is 150 mm high, and the machine builds 100 mm"), std::string::npos);
   EXPECT_NE(left[2].at("reason").get<std::string>().find("its group 'g' does not fit one build"), std::string::npos);
   const Outcome one = run("nest cube.stl --copies 90 --machine nuferbj --builds 1 --dry-run --json --quiet");
-  EXPECT_NE(one.out.find("the 1 build requested are full"), std::string::npos) << one.out;
+  EXPECT_NE(one.out.find("no space in 1 build (--builds)"), std::string::npos) << one.out;
+}
+
+// Two materials need two builds, and there is one: what has no build is reported, at a fixed position or not.
+TEST_F(Nesting, FixedPartsWithoutABuildAreReported) {
+  write_text(folder_ / "orders.csv",
+             "file,fixed,material,keep_apart_mm\ncube.stl,,bronze,\ncube.stl,10 10,steel,\nbar.stl,,bronze,70\n");
+  const Outcome made = run("nest orders.csv --bed 100x100 --builds 1 -o week --json --quiet");
+  ASSERT_EQ(made.code, 0) << made.err;
+  const auto json = nlohmann::json::parse(made.out);
+  EXPECT_EQ(json.at("builds")[0].at("parts"), 1);
+  const auto& left = json.at("left_out");
+  ASSERT_EQ(left.size(), 2u);
+  EXPECT_EQ(left[0].at("row"), 2);
+  EXPECT_EQ(left[0].at("reason"), "no space in 1 build (--builds)");
+  EXPECT_NE(left[1].at("reason").get<std::string>().find("fit the free bed in none of 4 turns"), std::string::npos);
 }
 
 TEST_F(Nesting, ColumnsDecideWherePartsAre) {
