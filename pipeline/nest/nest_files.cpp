@@ -154,7 +154,7 @@ Status write_build(const fs::path& folder, const SheetHead& head, const NestPlan
 }  // namespace
 
 Status write_nest(const std::string& directory, bool overwrite, const NestPlan& plan, const OrderTable& table,
-                  const Job& options, std::string_view command, const std::string& machine) {
+                  const Job& options, std::string_view command, const std::string& machine, const std::atomic<bool>& cancel) {
   if (Status status = make_directory(directory, overwrite); !status) return status;
   // Begun first and finished last: it is the claim of the directory.
   auto orders = File::open((fs::path(directory) / "orders.csv").string(), {.replace = overwrite});
@@ -166,7 +166,8 @@ Status write_nest(const std::string& directory, bool overwrite, const NestPlan& 
   Status status = orders->append(cost::csv_text(orders_table(plan, table, serials)));
   for (std::size_t b = 0; b < plan.builds.size() && status; ++b) {
     const SheetHead head{fmt::format("{}, build {} of {}", name, b + 1, plan.builds.size()), machine, {}};
-    status = write_build(build_folder(directory, b), head, plan, plan.builds[b], table, serials, options, command);
+    if (cancel) status = Error{Fault::kInterrupted, fmt::format("-o {}: interrupted; its builds are removed", directory)};
+    if (status) status = write_build(build_folder(directory, b), head, plan, plan.builds[b], table, serials, options, command);
   }
   if (status) {
     const auto written = orders->finish();

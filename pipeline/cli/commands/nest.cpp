@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/nest/nest_files.h"
@@ -184,7 +185,9 @@ Outcome run_nest(const Arguments& arguments, Context& context) {
   const auto plan = nest_orders(table->rows, *space, *job);
   if (!plan) return plan.error();
   if (!arguments.has("--dry-run")) {
-    Status status = write_nest(job->output, arguments.has("--overwrite"), *plan, *table, *job, command, machine);
+    keep_on_signals();  // builds without their list of orders are removed
+    Status status =
+        write_nest(job->output, arguments.has("--overwrite"), *plan, *table, *job, command, machine, context.cancel());
     if (!status) return status;
   }
   if (!arguments.has("--quiet")) context.say_text(text_of(nest_lines(*plan, *table)));
