@@ -110,11 +110,17 @@ Status Archive::list() {
     const std::string_view name = entry.name;
     if (name.ends_with('/') || name.ends_with('\\')) continue;
     const bool encrypted = (entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE;
-    const PackedFile file{static_cast<std::uint64_t>(i), entry.comp_size, entry.size, encrypted};
+    const PackedFile file{static_cast<std::uint64_t>(i), entry.comp_size, entry.size, encrypted, std::string(name)};
     if (!entries_.emplace(part_name(name), file).second)
       return source_->error(fmt::format("holds two entries of the name {}; export it again", quoted(name)));
   }
   return {};
+}
+
+std::map<std::string, std::string> Archive::names() const {
+  std::map<std::string, std::string> names;
+  for (const auto& [key, file] : entries_) names.emplace(key, file.name);
+  return names;
 }
 
 Status Archive::read(const std::string& name, const std::function<Status(std::string_view)>& take) {

@@ -28,6 +28,9 @@ class Archive {
 
   bool has(const std::string& name) const { return entries_.count(name) > 0; }
 
+  /// The names of all entries, as part_name() gives them and as they are in the archive.
+  std::map<std::string, std::string> names() const;
+
   /// Gives an entry's bytes to `take` in pieces of 64 KiB. All that was inflated so far and what the entry says of its size are
   /// bounded by options.expanded_limit and expansion_is_absurd(). Entries that are not read may be of any size and kind.
   ///
@@ -41,6 +44,7 @@ class Archive {
   struct PackedFile {
     std::uint64_t index, packed, expanded;
     bool encrypted;
+    std::string name;
   };
   struct Discard {
     void operator()(zip* archive) const;
