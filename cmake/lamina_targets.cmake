@@ -214,6 +214,7 @@ endif()
 if(LAMINA_BENCH)
   find_package(benchmark REQUIRED)
   lamina_sources(bench_sources "bench/*.cpp")
+  list(FILTER bench_sources EXCLUDE REGEX "/bench/peers/")  # programs on their own, of other libraries
   if(bench_sources)
     # Benchmarks check their answers against the same slow reference as the tests.
     add_executable(lamina_bench ${bench_sources} tests/raster/reference.cpp)

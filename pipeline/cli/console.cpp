@@ -129,7 +129,7 @@ Status Console::give(const Json& value) { return print(json_line(with_schema(val
 
 void Console::progress(const ProgressEvent& event) {
   using Stage = ProgressEvent::Stage;
-  const bool counted = event.stage == Stage::kLayers;
+  const bool counted = event.stage == Stage::kLayers || event.stage == Stage::kBuilds;
   if (counted) {
     lose_patience();
     keep_on_signals();
@@ -138,8 +138,9 @@ void Console::progress(const ProgressEvent& event) {
     using Style = Progress::Style;
     progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);
   }
-  write_all(STDERR_FILENO, counted ? progress_->report(event.done, event.total)
-                                   : progress_->begin(event.stage == Stage::kLoading ? "loading parts" : "indexing"));
+  write_all(STDERR_FILENO, counted
+                               ? progress_->report(event.done, event.total, event.stage == Stage::kBuilds ? "builds" : "layers")
+                               : progress_->begin(event.stage == Stage::kLoading ? "loading parts" : "indexing"));
 }
 
 const std::atomic<bool>& Console::cancel() { return watch_for_signals(); }

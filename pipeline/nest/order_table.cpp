@@ -8,11 +8,13 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <numeric>
 #include <set>
 #include <string_view>
 #include <tuple>
 #include <utility>
 
+#include "pipeline/nest/csv_rows.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
@@ -23,80 +25,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t kMaxCopies = 1'000'000;
-
-/// A cell and where it begins, both from 1.
-struct Cell {
-  std::string text;
-  std::uint32_t line = 1, column = 1;
-};
-
-/// Divides text into rows of cells.
-class CsvRows {
- public:
-  CsvRows(std::string_view text, char separator) : text_(text), separator_(separator) {}
-
-  /// The next row that is not empty; false at the end. fault  an opening quote without a closing one
-  bool next(std::vector<Cell>& cells, std::optional<Cell>& fault) {
-    while (at_ < text_.size()) {
-      cells.clear();
-      do {
-        cells.push_back(cell(fault));
-      } while (at_ < text_.size() && text_[at_] == separator_ && (step(), true));
-      end_line();
-      if (cells.size() > 1 || !cells[0].text.empty()) return true;
-    }
-    return false;
-  }
-
- private:
-  void step() {
-    if (text_[at_] == '\n') {
-      ++line_;
-      column_ = 0;
-    }
-    // Bytes that continue a character of UTF-8 are no columns.
-    if ((static_cast<unsigned char>(text_[at_]) & 0xc0) != 0x80) ++column_;
-    ++at_;
-  }
-  bool at_end_of_line() const { return at_ == text_.size() || text_[at_] == '\n' || text_.substr(at_, 2) == "\r\n"; }
-  void end_line() {
-    if (at_ < text_.size() && text_[at_] == '\r') step();
-    if (at_ < text_.size()) {
-      step();
-      column_ = 1;
-    }
-  }
-  Cell cell(std::optional<Cell>& fault) {
-    Cell cell{{}, line_, column_};
-    if (at_ < text_.size() && text_[at_] == '"') {
-      step();
-      for (;;) {
-        if (at_ == text_.size()) {
-          fault = cell;
-          return cell;
-        }
-        if (text_[at_] == '"') {
-          step();
-          if (at_ == text_.size() || text_[at_] != '"') break;
-        }
-        cell.text += text_[at_];
-        step();
-      }
-    }
-    while (!at_end_of_line() && text_[at_] != separator_) {
-      cell.text += text_[at_];
-      step();
-    }
-    const auto first = cell.text.find_first_not_of(" \t"), last = cell.text.find_last_not_of(" \t");
-    cell.text = first == std::string::npos ? std::string() : cell.text.substr(first, last - first + 1);
-    return cell;
-  }
-
-  std::string_view text_;
-  char separator_;
-  std::size_t at_ = 0;
-  std::uint32_t line_ = 1, column_ = 1;
-};
 
 // --- values; each returns "" or what is wrong
 
@@ -126,18 +54,8 @@ std::vector<std::string> words_of_cell(const std::string& text) {
 }
 
 std::string read_due(const std::string& text, OrderRow& row) {
-  int year = 0, month = 0, day = 0;
-  const auto number = [&](std::size_t from, std::size_t size, int& value) {
-    const auto [end, error] = std::from_chars(text.data() + from, text.data() + from + size, value);
-    return error == std::errc() && end == text.data() + from + size;
-  };
-  const bool shaped =
-      text.size() == 10 && text[4] == '-' && text[7] == '-' && number(0, 4, year) && number(5, 2, month) && number(8, 2, day);
-  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
-                                         std::chrono::day(static_cast<unsigned>(day))};
-  if (!shaped || !date.ok()) return fmt::format("'{}' is not a date as 2026-12-24", one_line(text));
-  row.due = static_cast<std::int32_t>(std::chrono::sys_days(date).time_since_epoch().count());
-  return {};
+  row.due = days_of(text);
+  return row.due ? std::string() : fmt::format("'{}' is not a date as 2026-12-24", one_line(text));
 }
 
 std::string read_fixed(const std::string& text, OrderRow& row) {
@@ -167,8 +85,10 @@ std::string read_turns(const std::string& text, OrderRow& row) {
 std::string read_down(const std::string& text, OrderRow& row) {
   const bool sign = text.size() == 2 && (text[0] == '+' || text[0] == '-');
   if (!sign || text[1] < 'x' || text[1] > 'z') return fmt::format("'{}' must be one of -x, +x, -y, +y, -z, +z", one_line(text));
-  row.down_positive = text[0] == '+';
-  row.down_axis = text[1];
+  const double side = text[0] == '+' ? 90 : -90;
+  if (text == "+z") row.rest_deg = {180, 0};
+  if (text[1] == 'x') row.rest_deg = {0, side};
+  if (text[1] == 'y') row.rest_deg = {-side, 0};
   return {};
 }
 
@@ -207,31 +127,54 @@ constexpr std::pair<std::string_view, ReadCell> kColumns[] = {
     {"material", read_text<&OrderRow::material>},
     {"note", read_text<&OrderRow::note>}};
 
+/// Whether a word begins like a name and differs from it by three letters at most.
+bool is_misspelt(const std::string& word, std::string_view name) {
+  const auto same = std::ranges::mismatch(word, name).in1 - word.begin();
+  if (same < 3 || word.size() > name.size() + 2) return false;
+  std::vector<std::size_t> above(name.size() + 1), row(name.size() + 1);  // letters to change, of what begins both
+  std::iota(above.begin(), above.end(), std::size_t{0});
+  for (std::size_t i = 0; i < word.size(); ++i) {
+    row[0] = i + 1;
+    for (std::size_t k = 0; k < name.size(); ++k)
+      row[k + 1] = std::min({above[k] + (word[i] == name[k] ? 0 : 1), above[k + 1] + 1, row[k] + 1});
+    std::swap(above, row);
+  }
+  return above[name.size()] <= 3;
+}
+
 class OrderReader {
  public:
   OrderReader(const std::string& path, std::string_view text) : path_(path), rows_(text, separator_of(text)) {}
 
   /// errors  kInput without a usable header
   Status read_header() {
-    std::vector<Cell> cells;
-    std::optional<Cell> open;
+    std::vector<CsvCell> cells;
+    std::optional<CsvCell> open;
     if (!rows_.next(cells, open)) return Error{Fault::kInput, fmt::format("{}: is empty; its first line names columns", path_)};
     std::set<std::string> names;
-    for (const Cell& cell : cells) {
-      if (!cell.text.empty() && !names.insert(cell.text).second)
+    for (const CsvCell& cell : cells) {
+      if (!cell.text.empty() && !names.insert(lower_case(cell.text)).second)
         fault(cell, fmt::format("column '{}' is there twice", one_line(cell.text)));
-      const auto* known = std::ranges::find(kColumns, cell.text, &std::pair<std::string_view, ReadCell>::first);
+      const auto* known = std::ranges::find(kColumns, lower_case(cell.text), &std::pair<std::string_view, ReadCell>::first);
       if (known == std::end(kColumns)) table.more_columns.push_back(cell.text);
       columns_.push_back(known == std::end(kColumns) ? nullptr : known);
     }
-    if (!names.contains("file"))
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (columns_[i] != nullptr) continue;
+      for (const auto& [name, read] : kColumns) {
+        if (!names.contains(std::string(name)) && is_misspelt(lower_case(cells[i].text), name))
+          fault(cells[i],
+                fmt::format("column '{}': did you mean '{}'? Otherwise give it another name", one_line(cells[i].text), name));
+      }
+    }
+    if (!names.contains("file") && table.faults.empty())
       return Error{Fault::kInput, fmt::format("{}:1:1: has no column 'file'; the first line names the columns", path_)};
     return {};
   }
 
   void read_rows() {
-    std::vector<Cell> cells;
-    std::optional<Cell> open;
+    std::vector<CsvCell> cells;
+    std::optional<CsvCell> open;
     while (rows_.next(cells, open)) {
       const std::size_t faults = table.faults.size();
       if (open) {
@@ -241,6 +184,7 @@ class OrderReader {
       OrderRow row;
       row.line = cells[0].line;
       read_cells(cells, row);
+      if (!row.path.empty()) check_file(row, cells);
       if (table.faults.size() == faults) check(row, cells);
       if (table.faults.size() == faults) table.rows.push_back(std::move(row));
     }
@@ -257,10 +201,10 @@ class OrderReader {
       if (std::ranges::count(line, each) > std::ranges::count(line, best)) best = each;
     return best;
   }
-  void fault(const Cell& cell, const std::string& what) {
+  void fault(const CsvCell& cell, const std::string& what) {
     table.faults.push_back(fmt::format("{}:{}:{}: {}", path_, cell.line, cell.column, what));
   }
-  void read_cells(const std::vector<Cell>& cells, OrderRow& row) {
+  void read_cells(const std::vector<CsvCell>& cells, OrderRow& row) {
     if (cells.size() != columns_.size()) {
       fault(cells[std::min(cells.size(), columns_.size()) - 1],
             fmt::format("the row has {} cells, the first line {}", cells.size(), columns_.size()));
@@ -279,17 +223,21 @@ class OrderReader {
       }
     }
   }
-  const Cell& cell_of(const std::vector<Cell>& cells, std::string_view name) const {
+  const CsvCell& cell_of(const std::vector<CsvCell>& cells, std::string_view name) const {
     for (std::size_t i = 0; i < columns_.size(); ++i)
       if (columns_[i] != nullptr && columns_[i]->first == name) return cells[i];
     return cells[0];
   }
-  void check(OrderRow& row, const std::vector<Cell>& cells) {
+  void check_file(OrderRow& row, const std::vector<CsvCell>& cells) {
     row.path = (fs::path(path_).parent_path() / row.path).string();
     std::error_code error;
     if (!fs::is_regular_file(row.path, error))
       fault(cell_of(cells, "file"), fmt::format("{}: no such file", one_line(row.path)));
+  }
+  void check(OrderRow& row, const std::vector<CsvCell>& cells) {
     if (row.fixed_mm && row.copies > 1) fault(cell_of(cells, "fixed"), "one position is for one copy; give each its own row");
+    if (row.fixed_mm && !row.group.empty())
+      fault(cell_of(cells, "group"), "is of a part with a position, which is in the first build; leave out one of them");
     if (!row.order.empty()) {
       const auto [other, fresh] = lines_.try_emplace({row.order, row.path, row.fixed_mm.has_value() ? row.line : 0}, row.line);
       if (!fresh)
@@ -305,6 +253,10 @@ class OrderReader {
       if (!single && first->second.first != row.material)
         fault(cell_of(cells, "group"), fmt::format("group '{}' is of material '{}' in line {}; a build has one",
                                                    one_line(row.group), one_line(first->second.first), first->second.second));
+      const auto [rank, only] = group_priority_.try_emplace(row.group, row.priority, row.line);
+      if (!only && rank->second.first != row.priority)
+        fault(cell_of(cells, "priority"), fmt::format("group '{}' has priority {} in line {}", one_line(row.group),
+                                                      rank->second.first, rank->second.second));
     }
   }
 
@@ -312,7 +264,7 @@ class OrderReader {
   CsvRows rows_;
   std::vector<const std::pair<std::string_view, ReadCell>*> columns_;
   std::map<std::tuple<std::string, std::string, std::uint32_t>, std::uint32_t> lines_;
-  std::map<std::string, std::pair<std::int32_t, std::uint32_t>> priority_;
+  std::map<std::string, std::pair<std::int32_t, std::uint32_t>> priority_, group_priority_;
   std::map<std::string, std::pair<std::string, std::uint32_t>> material_;
 };
 
@@ -334,6 +286,21 @@ Result<OrderTable> read_orders(const std::string& path) {
   if (Status status = reader.read_header(); !status) return status.error();
   reader.read_rows();
   return std::move(reader.table);
+}
+
+std::optional<std::int32_t> days_of(const std::string& text) {
+  int year = 0, month = 0, day = 0;
+  const auto number = [&](std::size_t from, std::size_t size, int& value) {
+    const auto [end, error] = std::from_chars(text.data() + from, text.data() + from + size, value);
+    return error == std::errc() && end == text.data() + from + size;
+  };
+  const bool shaped =
+      text.size() == 10 && text[4] == '-' && text[7] == '-' && number(0, 4, year) && number(5, 2, month) && number(8, 2, day);
+  if (!shaped) return std::nullopt;
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (!date.ok()) return std::nullopt;
+  return static_cast<std::int32_t>(std::chrono::sys_days(date).time_since_epoch().count());
 }
 
 std::string date_text(std::int32_t days) {

@@ -22,15 +22,18 @@ struct OrderRow {
   std::int32_t priority = 0;        // larger ones first
   std::optional<std::array<double, 2>> fixed_mm = {};
   std::vector<MicroDegrees> turns = {};  // about z, that are allowed; empty: those of the job
-  char down_axis = 'z';                  // of the file, that points to the floor
-  bool down_positive = false;
+  std::array<double, 2> rest_deg{0, 0};  // about x and y, before a turn: they put the face down that is requested
   double keep_apart_mm = 0;
-  std::vector<std::string> more = {};  // cells of unknown columns
+  std::uint32_t request = 0;              // the part of the job whose settings it has
+  bool fills = false;                     // as many copies as the builds of the others have space for, at least one build
+  std::vector<std::string> serials = {};  // that its copies have already; empty: new ones
+  std::vector<std::string> more = {};     // cells of unknown columns
 };
 
 struct OrderTable {
   std::vector<OrderRow> rows;
   std::vector<std::string> more_columns;  // unknown ones, which outputs keep
+  std::vector<std::string> serials;       // of other builds, which new ones may not repeat
   std::vector<std::string> faults;        // "orders.csv:7:12: ..." each; rows with faults are left out
 };
 
@@ -42,7 +45,9 @@ struct OrderTable {
 /// cost    O(bytes)
 Result<OrderTable> read_orders(const std::string& path);
 
-/// "2026-11-30". errors  "" for no date
+/// Days since 1970-01-01 of "2026-11-30"; none if it is no date.
+std::optional<std::int32_t> days_of(const std::string& text);
+/// "2026-11-30"
 std::string date_text(std::int32_t days);
 
 }  // namespace lamina::pipeline

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "stages/formats/svg/svg_writer.h"
 
@@ -15,8 +17,8 @@ namespace {
 constexpr const char* kStyle =
     "@page{size:A4;margin:10mm}body{font:8pt sans-serif;margin:0;color:#111}h1{font-size:13pt;margin:0 0 1mm}"
     "p{margin:0 0 2mm}svg{width:100%;height:auto;display:block}.views{display:grid;grid-template-columns:1fr;gap:2mm}"
-    ".above{max-width:120mm;margin:auto}.parts{columns:3;column-gap:4mm;margin-top:2mm}"
-    ".part{display:grid;grid-template-columns:7mm 1fr 17mm 10mm;border-bottom:0.1mm solid #bbb;break-inside:avoid;"
+    ".above{max-width:120mm;margin:auto}.parts{columns:2;column-gap:5mm;margin-top:2mm}.top{margin-top:3mm}"
+    ".part{display:grid;grid-template-columns:7mm 1fr 1.3fr 1fr 17mm 9mm;column-gap:1mm;border-bottom:0.1mm solid #bbb;break-inside:avoid;"
     "font-size:6.5pt;line-height:1.35}.part b{text-align:right;padding-right:1.5mm}.part span{overflow:hidden;white-space:nowrap;"
     "text-overflow:ellipsis}.sign{display:grid;grid-template-columns:1fr 1fr 1fr;gap:6mm;margin-top:9mm;break-inside:avoid}"
     ".sign div{border-top:0.3mm solid #111;padding-top:1mm}code{font-size:7pt}";
@@ -39,10 +41,16 @@ std::string path_of(const arrange::BitShape& shape, double cell_mm) {
   return path;
 }
 
+/// With room for the lines around a picture, mm.
+std::string view_box(double width, double height) {
+  const double around = width / 100;
+  return fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}", -around, -around, width + 2 * around, height + 2 * around);
+}
+
 /// The bed as a plan, y upwards.
 std::string view_from_above(const NestPlan& plan, const NestBuild& build) {
   const double width = plan.bed_mm[0], depth = plan.bed_mm[1];
-  std::string svg = fmt::format("<svg class=\"above\" viewBox=\"0 0 {:.6g} {:.6g}\"><defs>", width, depth);
+  std::string svg = fmt::format("<svg class=\"above\" viewBox=\"{}\"><defs>", view_box(width, depth));
   std::set<std::uint32_t> drawn;
   for (const NestedCopy& copy : build.copies) {
     if (drawn.insert(copy.picture).second)
@@ -69,20 +77,29 @@ std::string view_from_above(const NestPlan& plan, const NestBuild& build) {
 std::string view_from_the_side(const NestPlan& plan, const NestBuild& build) {
   const double width = plan.bed_mm[0], height = std::max(build.height_mm, width / 20);
   std::string svg = fmt::format(
-      "<svg viewBox=\"0 0 {0:.6g} {1:.6g}\"><rect width=\"{0:.6g}\" height=\"{1:.6g}\" fill=\"none\" "
+      "<svg viewBox=\"{2}\"><rect width=\"{0:.6g}\" height=\"{1:.6g}\" fill=\"none\" "
       "stroke=\"#111\" stroke-width=\"0.3%\"/>",
-      width, height);
+      width, height, view_box(width, height));
   std::vector<std::size_t> order(build.copies.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order,
                            [&](std::size_t a, std::size_t b) { return build.copies[a].height_mm > build.copies[b].height_mm; });
+  // Numbers stand below the tops of their parts, where none stands yet.
+  const double size = width / 80;
+  std::set<std::pair<long, long>> taken;
+  std::string numbers;
   for (const std::size_t i : order) {
     const NestedCopy& copy = build.copies[i];
     svg += fmt::format(
-        "<rect x=\"{:.6g}\" y=\"{:.6g}\" width=\"{:.6g}\" height=\"{:.6g}\" fill=\"#c8d2dc\" stroke=\"#567\" "
+        "<rect x=\"{:.6g}\" y=\"{:.6g}\" width=\"{:.6g}\" height=\"{:.6g}\" fill=\"#c8d2dc\" fill-opacity=\"0.6\" stroke=\"#567\" "
         "stroke-width=\"0.1%\"/>",
         copy.x_mm, height - copy.height_mm, copy.width_mm, copy.height_mm);
+    const double x = copy.x_mm + copy.width_mm / 2, y = height - copy.height_mm + size;
+    const std::pair cell{std::lround(x / size / 2), std::lround(y / size)};
+    if (!taken.insert(cell).second) continue;
+    numbers += fmt::format("<text x=\"{:.6g}\" y=\"{:.6g}\">{}</text>", x, std::min(y, height), i + 1);
   }
+  svg += fmt::format("<g font-size=\"{:.4g}\" text-anchor=\"middle\">", size) + numbers + "</g>";
   return svg + "</svg>\n";
 }
 
@@ -92,11 +109,11 @@ std::string part_list(const NestBuild& build, const std::vector<OrderRow>& rows,
   std::size_t number = 0;
   for (const NestedCopy& copy : build.copies) {
     const OrderRow& row = rows[copy.row];
-    const std::string order = row.order.empty() ? std::filesystem::path(row.path).filename().string() : row.order;
-    html +=
-        fmt::format("<div class=\"part\"><b>{}</b><span>{} {}</span><span>{:.1f}, {:.1f}</span><span>{:.1f}</span></div>\n",
-                    ++number, formats::svg_escaped(serials[copy.row][copy.copy]),
-                    formats::svg_escaped(row.customer.empty() ? order : row.customer), copy.x_mm, copy.y_mm, copy.height_mm);
+    html += fmt::format(
+        "<div class=\"part\"><b>{}</b><span>{}</span><span>{}</span><span>{}</span><span>{:.1f}, {:.1f}</span><span>{:.1f}</span></div>\n",
+        ++number, formats::svg_escaped(serials[copy.row][copy.copy]),
+        formats::svg_escaped(std::filesystem::path(row.path).filename().string()),
+        formats::svg_escaped(row.customer.empty() ? row.order : row.customer), copy.x_mm, copy.y_mm, copy.height_mm);
   }
   return html + "</div>\n";
 }
@@ -132,13 +149,21 @@ std::string sheet_html(const SheetHead& head, const NestPlan& plan, const NestBu
       "<body>\n<h1>{0}</h1>\n",
       formats::svg_escaped(head.title), kStyle);
   html += fmt::format(
-      "<p>{} parts{}{}; {:.3f} mm high, {:.3f} cm3 of parts, {:.1f} % of the bed covered. Job <code>{}</code></p>\n",
-      build.copies.size(), build.material.empty() ? "" : " of " + formats::svg_escaped(build.material),
+      "<p>{} part{}{}{}; {:.3f} mm high, {:.3f} cm3 of parts, {:.1f} % of the bed covered</p>\n<p>Hash (XXH3-128) of plate.toml: <code>{}</code></p>\n",
+      build.copies.size(), build.copies.size() == 1 ? "" : "s",
+      build.material.empty() ? "" : " of " + formats::svg_escaped(build.material),
       head.machine.empty() ? "" : " on " + formats::svg_escaped(head.machine), build.height_mm, build.volume_mm3 / 1000,
       100 * build.area_mm2 / plan.bed_mm2, head.hash);
+  if (build.use) {
+    const cost::Use& job = build.use->quote.job;
+    html += fmt::format("<p>{} layers, about {:.2f} h; {:.2f} l of powder dosed, {:.1f} ml of binder{}{}</p>\n",
+                        build.use->layers, static_cast<double>(job.microseconds) / 3.6e9,
+                        static_cast<double>(job.fed_nl) * 1e-9, static_cast<double>(job.binder_nl) * 1e-6,
+                        head.presets.empty() ? "" : "; presets ", formats::svg_escaped(head.presets));
+  }
   html += "<div class=\"views\">" + view_from_above(plan, build) + view_from_the_side(plan, build) + "</div>\n";
-  html += "<p><b>From the top</b>, when the powder is removed: " + order_from_the_top(build) + "</p>\n";
-  html += "<p>Number, serial number, customer or order, position of the front left corner in mm, height in mm</p>\n";
+  html += "<p class=\"top\"><b>From the top</b>, when the powder is removed: " + order_from_the_top(build) + "</p>\n";
+  html += "<p>Number, serial number, file, customer or order, position of the front left corner in mm, height in mm</p>\n";
   html += part_list(build, rows, serials);
   return html +
          "<div class=\"sign\"><div>Printed by, date</div><div>Unpacked by, date</div><div>Inspected by, date</div></div>\n</body></html>\n";

@@ -13,6 +13,7 @@ struct SheetHead {
   std::string title;    // "week, build 1 of 2"
   std::string machine;  // name; may be empty
   std::string hash;     // of the build's job file
+  std::string presets;  // of powder and binder; may be empty
 };
 
 /// HTML without scripts and other files, for A4: the bed from above and from the side with numbered parts, the parts with

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+
 #include "pipeline/report/timing.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
@@ -52,7 +55,52 @@ void add_dry_run(const Summary& s, std::vector<NamedText>& lines) {
 
 }  // namespace
 
+namespace {
+
+/// Of jobs with many parts: a line for each file, and one for each kind of note, of all its parts.
+Summary::Lines file_lines(const std::vector<PartSummary>& parts) {
+  struct FileParts {
+    const PartSummary* first;
+    std::uint64_t copies = 0;
+    std::vector<std::string> repairs = {};
+    std::size_t noted = 0;  // parts with other notes
+    std::string note = {};  // the first of them
+  };
+  std::vector<FileParts> files;
+  std::map<std::string_view, std::size_t> number;
+  for (const PartSummary& part : parts) {
+    const auto [known, fresh] = number.try_emplace(part.path, files.size());
+    if (fresh) files.push_back({&part});
+    FileParts& file = files[known->second];
+    file.copies += part.copies;
+    bool other = false;
+    for (const Note& note : part.notes) {
+      if (!note.repair && file.note.empty()) file.note = note.text;
+      other = other || !note.repair;
+      if (note.repair && std::ranges::find(file.repairs, note.text) == file.repairs.end()) file.repairs.push_back(note.text);
+    }
+    file.noted += other;
+  }
+  Summary::Lines lines;
+  for (const FileParts& file : files) {
+    lines.emplace_back(lines.empty() ? "parts" : "",
+                       fmt::format("{} x {}{}", one_line(file.first->path), file.copies,
+                                   file.first->triangles == 0 ? std::string(": images")
+                                                              : ": " + readable_count(file.first->triangles) + " triangles"));
+    for (const std::string& repair : file.repairs) lines.emplace_back("", "  repair: " + one_line(repair));
+    if (file.noted > 0) {
+      const std::string more = file.noted > 1 ? fmt::format("; {} more have notes, see --json", file.noted - 1) : "";
+      lines.emplace_back("", "  " + one_line(file.note) + more);
+    }
+  }
+  return lines;
+}
+
+}  // namespace
+
 Summary::Lines part_lines(const std::vector<PartSummary>& parts) {
+  constexpr std::size_t kListed = 20;
+  if (parts.size() > kListed) return file_lines(parts);
   Summary::Lines lines;
   for (const PartSummary& part : parts) {
     const Box& box = part.bounds;

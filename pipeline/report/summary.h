@@ -49,7 +49,7 @@ struct Summary {
   std::string json() const;
 };
 
-/// Each part on a line, its notes below it; as in a summary.
+/// Each part on a line, its notes below it; of more than 20 parts each file; as in a summary.
 Summary::Lines part_lines(const std::vector<PartSummary>& parts);
 Json part_json(const PartSummary& part);
 Json warnings_json(const std::vector<Warning>& warnings);

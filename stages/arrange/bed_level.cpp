@@ -7,53 +7,16 @@
 namespace lamina::arrange {
 namespace {
 
-/// out[x] = in[x + by]; beyond the row there are set cells.
-void read_ahead(std::span<const std::uint64_t> in, std::uint32_t by, std::vector<std::uint64_t>& out) {
-  const std::size_t words = by / 64, bits = by % 64;
-  const auto word = [&](std::size_t w) { return w < in.size() ? in[w] : ~std::uint64_t{0}; };
-  for (std::size_t w = 0; w < out.size(); ++w) {
-    std::uint64_t value = word(w + words) >> bits;
-    if (bits > 0) value |= word(w + words + 1) << (64 - bits);
-    out[w] = value;
+/// The first clear cell of a row from x on; none without one.
+std::optional<std::uint32_t> first_clear(std::span<const std::uint64_t> row, std::uint32_t x) {
+  std::uint32_t w = x / 64;
+  if (w >= row.size()) return std::nullopt;
+  std::uint64_t open = ~row[w] & (~std::uint64_t{0} << (x % 64));
+  while (open == 0) {
+    if (++w == row.size()) return std::nullopt;
+    open = ~row[w];
   }
-}
-
-/// row[x] becomes the union of row[x .. x + length), length >= 1.
-void take_windows(std::vector<std::uint64_t>& row, std::uint32_t length) {
-  for (std::uint32_t done = 1; done < length;) {
-    const std::uint32_t step = std::min(done, length - done);
-    const std::size_t words = step / 64, bits = step % 64;
-    for (std::size_t w = 0; w < row.size(); ++w) {
-      const auto word = [&](std::size_t i) { return i < row.size() ? row[i] : ~std::uint64_t{0}; };
-      std::uint64_t value = word(w + words) >> bits;
-      if (bits > 0) value |= word(w + words + 1) << (64 - bits);
-      row[w] |= value;
-    }
-    done += step;
-  }
-}
-
-/// Calls use(begin, end) for each run of set cells of a row.
-template <class Use>
-void for_each_run(std::span<const std::uint64_t> row, std::uint32_t width, Use use) {
-  std::uint32_t x = 0;
-  const auto skip = [&](bool set) {
-    while (x < width) {
-      const std::uint64_t word = (set ? ~row[x / 64] : row[x / 64]) >> (x % 64);
-      if (word != 0) {
-        x = std::min(width, x + static_cast<std::uint32_t>(std::countr_zero(word)));
-        return;
-      }
-      x = std::min(width, (x / 64 + 1) * 64);
-    }
-  };
-  for (;;) {
-    skip(false);
-    if (x >= width) return;
-    const std::uint32_t begin = x;
-    skip(true);
-    use(begin, x);
-  }
+  return w * 64 + static_cast<std::uint32_t>(std::countr_zero(open));
 }
 
 }  // namespace
@@ -92,65 +55,55 @@ BedCells bed_cells(const BedOutline& bed, std::span<const KeepOut> keep_out, std
   return cells;
 }
 
-BedLevel::BedLevel(const BedCells& bed, std::size_t shapes)
-    : taken_(bed.blocked), next_(shapes), hit_(taken_.words()), window_(taken_.words()) {}
+BedLevel::BedLevel(const BedCells& bed, std::size_t shapes) : openings_(bed.blocked), next_(shapes) {}
 
-/// Whether the shape has a position in rows from y on, at column `from` or to the right of it.
-bool BedLevel::free_at(const BitShape& shape, std::uint32_t y, std::uint32_t from, std::uint32_t& x) {
-  std::ranges::fill(hit_, 0);
-  const std::uint32_t last = taken_.width - shape.width;  // the last column
-  if (from > last) return false;
-  for (std::uint32_t row = 0; row < shape.depth; ++row) {
-    ++steps_;
-    for_each_run(shape.row(row), shape.width, [&](std::uint32_t begin, std::uint32_t end) {
-      read_ahead(taken_.row(y + row), begin, window_);
-      take_windows(window_, end - begin);
-      for (std::size_t w = 0; w < hit_.size(); ++w) hit_[w] |= window_[w];
-    });
-    constexpr std::uint32_t kChecked = 8;  // rows
-    if (row % kChecked == 0 && std::ranges::all_of(hit_, [](std::uint64_t word) { return ~word == 0; })) return false;
-  }
-  for (std::uint32_t w = from / 64; w <= last / 64; ++w) {
-    std::uint64_t open = ~hit_[w];
-    if (w == from / 64) open &= ~std::uint64_t{0} << (from % 64);
-    if (open == 0) continue;
-    x = w * 64 + static_cast<std::uint32_t>(std::countr_zero(open));
-    return x <= last;
-  }
-  return false;
+std::optional<CellPosition> BedLevel::find(std::size_t number, const SearchShape& shape, std::uint32_t below) {
+  return find_from(next_[number], shape, below);
 }
 
-std::optional<CellPosition> BedLevel::find(std::size_t number, const BitShape& shape, std::uint32_t below) {
-  if (shape.width == 0 || shape.width > taken_.width || shape.depth > taken_.depth) return std::nullopt;
-  CellPosition& next = next_[number];
-  for (; next.y + shape.depth <= taken_.depth && next.y + shape.depth <= below; ++next.y, next.x = 0) {
-    if (free_at(shape, next.y, next.x, next.x)) return next;
+bool BedLevel::has_space(const SearchShape& shape) {
+  CellPosition front;
+  return find_from(front, shape, UINT32_MAX).has_value();
+}
+
+/// next  no position is before it; moves on
+std::optional<CellPosition> BedLevel::find_from(CellPosition& next, const SearchShape& shape, std::uint32_t below) {
+  const BitShape& taken = openings_.taken();
+  if (shape.square() == 0 || shape.width() > taken.width || shape.depth() > taken.depth) return std::nullopt;
+  const BitShape& blocked = openings_.blocked_for(shape.square());
+  const std::uint32_t last_x = taken.width - shape.width(), last_y = taken.depth - shape.depth();
+  for (; next.y <= last_y && next.y + shape.depth() <= below; ++next.y, next.x = 0) {
+    const std::span<const std::uint64_t> row = blocked.row(next.y + shape.square_y());
+    while (next.x <= last_x) {
+      const auto open = first_clear(row, next.x + shape.square_x());
+      if (!open || *open - shape.square_x() > last_x) break;
+      next.x = *open - shape.square_x();
+      const auto until = blocked_until(shape, taken, next.x, next.y);
+      if (!until) return next;
+      next.x = *until;
+    }
   }
   return std::nullopt;
 }
 
 bool BedLevel::is_free(const BitShape& shape, CellPosition at) const {
-  if (at.x + shape.width > taken_.width || at.y + shape.depth > taken_.depth) return false;
-  bool free = true;
-  for (std::uint32_t row = 0; row < shape.depth && free; ++row) {
-    for_each_run(shape.row(row), shape.width, [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t x = begin; x < end; ++x) free = free && !taken_.at(at.x + x, at.y + row);
-    });
-  }
-  return free;
+  const BitShape& taken = openings_.taken();
+  if (at.x + shape.width > taken.width || at.y + shape.depth > taken.depth) return false;
+  return !blocked_until(SearchShape(shape), taken, at.x, at.y);
 }
 
 void BedLevel::put(const GrownShape& grown, CellPosition at) {
   // The grown shape begins `reach` cells before the shape, and may end beyond the bed.
   const BitShape& shape = grown.shape;
+  const std::int64_t width = openings_.taken().width, depth = openings_.taken().depth;
   for (std::uint32_t row = 0; row < shape.depth; ++row) {
     const std::int64_t y = std::int64_t{at.y} + row - grown.reach;
-    if (y < 0 || y >= std::int64_t{taken_.depth}) continue;
+    if (y < 0 || y >= depth) continue;
     for_each_run(shape.row(row), shape.width, [&](std::uint32_t begin, std::uint32_t end) {
       const auto column = [&](std::uint32_t c) {
-        return static_cast<std::uint32_t>(std::clamp<std::int64_t>(std::int64_t{at.x} + c - grown.reach, 0, taken_.width));
+        return static_cast<std::uint32_t>(std::clamp<std::int64_t>(std::int64_t{at.x} + c - grown.reach, 0, width));
       };
-      taken_.set(static_cast<std::uint32_t>(y), column(begin), column(end));
+      openings_.take(static_cast<std::uint32_t>(y), column(begin), column(end));
     });
   }
 }

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "stages/arrange/openings.h"
+#include "stages/arrange/search_shape.h"
 #include "stages/arrange/silhouette.h"
 
 namespace lamina::arrange {
@@ -29,12 +31,6 @@ struct KeepOut {
 /// A cell is free if all of it is on the bed, out of the margin and of all boxes.
 BedCells bed_cells(const BedOutline& bed, std::span<const KeepOut> keep_out, std::int64_t cell);
 
-/// A shape that may be put, in one of its turns.
-struct Candidate {
-  const BitShape* shape;  // must outlive the level
-  const GrownShape* grown;
-};
-
 /// Position of a shape's first cell.
 struct CellPosition {
   std::uint32_t x = 0, y = 0;
@@ -49,23 +45,20 @@ class BedLevel {
 
   /// The front-most position of a shape, of several the left-most; none if there is none.
   /// below    of no use: positions whose last row is beyond it
-  /// cost     for each row that is tried, the words of the bed for each row of the shape, times the logarithm of its runs
-  std::optional<CellPosition> find(std::size_t number, const BitShape& shape, std::uint32_t below = UINT32_MAX);
+  /// cost     for each row that is tried, the words of the bed, and a few runs of the shape where its largest square is free
+  std::optional<CellPosition> find(std::size_t number, const SearchShape& shape, std::uint32_t below = UINT32_MAX);
+  /// Whether a shape has any position.
+  bool has_space(const SearchShape& shape);
   /// Whether a shape is on the bed and free there.
   bool is_free(const BitShape& shape, CellPosition at) const;
   /// Blocks the shape and what is nearer than the gap.
   void put(const GrownShape& grown, CellPosition at);
 
-  /// Rows of shapes that were compared with the bed.
-  std::uint64_t steps() const { return steps_; }
-
  private:
-  bool free_at(const BitShape& shape, std::uint32_t y, std::uint32_t from, std::uint32_t& x);
+  std::optional<CellPosition> find_from(CellPosition& next, const SearchShape& shape, std::uint32_t below);
 
-  BitShape taken_;
+  Openings openings_;
   std::vector<CellPosition> next_;  // by number of the shape
-  std::vector<std::uint64_t> hit_, window_;
-  std::uint64_t steps_ = 0;
 };
 
 }  // namespace lamina::arrange

@@ -22,18 +22,12 @@ class Filling {
   }
 
   void fill(const std::vector<std::uint32_t>& order) {
-    // The more demands in a row find no position, the more of the next ones are left to the next level.
-    constexpr std::size_t kPatience = 16;
-    std::size_t failures = 0;
-    for (std::size_t i = 0; i < order.size(); i += 1 + failures / kPatience) {
-      const Demand& demand = demands_[order[i]];
-      const std::size_t before = put.size();
-      if (!demand.group) {
-        put_copies(order[i]);
-      } else if (tried_.insert(*demand.group).second) {
-        put_group(order, *demand.group);
+    for (const std::uint32_t number : order) {
+      if (!demands_[number].group) {
+        put_copies(number);
+      } else if (tried_.insert(*demands_[number].group).second) {
+        put_group(order, *demands_[number].group);
       }
-      failures = put.size() > before ? 0 : failures + 1;
     }
   }
 
@@ -64,13 +58,13 @@ class Filling {
     std::optional<PutShape> best;
     std::tuple<std::uint32_t, std::uint32_t> score{UINT32_MAX, UINT32_MAX};
     for (const std::uint32_t shape : demands_[number].shapes) {
-      const GrownShape& search = shapes_[shape].search;
-      const auto at = level_.find(shape, search.shape, std::get<0>(score));
+      const SearchShape& search = shapes_[shape].search;
+      const auto at = level_.find(shape, search, std::get<0>(score));
       if (!at) continue;
-      const std::tuple<std::uint32_t, std::uint32_t> own{at->y + search.shape.depth, at->x};
+      const std::tuple<std::uint32_t, std::uint32_t> own{at->y + search.depth(), at->x};
       if (best && own >= score) continue;
       score = own;
-      best = PutShape{number, shape, {at->x + search.reach, at->y + search.reach}};
+      best = PutShape{number, shape, {at->x + shapes_[shape].reach, at->y + shapes_[shape].reach}};
     }
     if (!best) return false;
     level_.put(shapes_[best->shape].put, best->at);
@@ -95,8 +89,8 @@ std::vector<PutShape> fill_build(const BedCells& bed, std::span<const NestShape>
     const NestShape& shape = shapes[demands[number].shapes.front()];
     switch (by) {
       case 0: return shape.area_mm2;
-      case 1: return shape.search.shape.depth;
-      case 2: return shape.search.shape.width;
+      case 1: return shape.search.depth();
+      case 2: return shape.search.width();
       default: return 0;
     }
   };

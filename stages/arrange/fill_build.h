@@ -14,9 +14,13 @@ namespace lamina::arrange {
 
 /// A shape in one turn.
 struct NestShape {
-  GrownShape search;    // what has to be free: the shape, or more where it keeps others further away
+  SearchShape search;   // what has to be free: the shape, or more where it keeps others further away
+  std::uint32_t reach;  // cells from the first one of that to the first one of the shape, along x and y
   GrownShape put;       // what it takes: grown by its distance to others
   double area_mm2 = 0;  // of the shape itself
+
+  NestShape(const GrownShape& searched, GrownShape taken, double area)
+      : search(searched.shape), reach(searched.reach), put(std::move(taken)), area_mm2(area) {}
 };
 
 /// Copies that are requested, any of some shapes each.
@@ -41,7 +45,7 @@ struct FixedShape {
 };
 
 /// Fills a level in four orders of demands of equal rank, by area, depth, width, and as they come; keeps the one that covers
-/// most, of the first rank in which they differ. Where more than 16 demands in a row find no position, some are not tried.
+/// most, of the first rank in which they differ.
 ///
 /// fixed    are in the level already
 /// returns  in the order in which they were put

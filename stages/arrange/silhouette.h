@@ -3,7 +3,9 @@
 // A cell is set if the shadow of the part may reach into it, so shapes that share no cell do not overlap.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -30,6 +32,29 @@ struct BitShape {
   void set(std::uint32_t y, std::uint32_t begin, std::uint32_t end);
   std::uint64_t count() const;
 };
+
+/// Calls use(begin, end) for each run of set cells of a row.
+template <class Use>
+void for_each_run(std::span<const std::uint64_t> row, std::uint32_t width, Use use) {
+  std::uint32_t x = 0;
+  const auto skip = [&](bool set) {
+    while (x < width) {
+      const std::uint64_t word = (set ? ~row[x / 64] : row[x / 64]) >> (x % 64);
+      if (word != 0) {
+        x = std::min(width, x + static_cast<std::uint32_t>(std::countr_zero(word)));
+        return;
+      }
+      x = std::min(width, (x / 64 + 1) * 64);
+    }
+  };
+  for (;;) {
+    skip(false);
+    if (x >= width) return;
+    const std::uint32_t begin = x;
+    skip(true);
+    use(begin, x);
+  }
+}
 
 /// A part turned about z and put with the lower corner of its box at the origin. All lengths nm.
 struct Shadow {

@@ -42,6 +42,8 @@ Result<std::vector<std::string>> unpack_order(const std::string& path, const std
   std::vector<std::string> unpacked;
   for (const auto& [key, name] : archive->names()) {
     if (!is_part_name(name) && !is_table_name(name)) continue;
+    // What macOS adds: data of the Finder under the names of files.
+    if (name.starts_with("__MACOSX/") || fs::path(name).filename().string().starts_with("._")) continue;
     if (!stays_inside(name)) return source->error(fmt::format("holds {}, which leads out of its folder", load::quoted(name)));
     const fs::path to = fs::path(folder) / name;
     std::error_code error;

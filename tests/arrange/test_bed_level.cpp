@@ -51,7 +51,7 @@ TEST(BedLevel, FindsTheFirstFreePosition) {
       for (std::uint32_t y = 0; !expected && y + shape.depth <= 90; ++y)
         for (std::uint32_t x = 0; !expected && x + shape.width <= 150; ++x)
           if (!meets(taken, shape, x, y)) expected = CellPosition{x, y};
-      const auto found = level.find(number, shape);
+      const auto found = level.find(number, SearchShape(shape));
       ASSERT_EQ(found.has_value(), expected.has_value());
       if (!found) continue;
       ASSERT_EQ(found->x, expected->x);

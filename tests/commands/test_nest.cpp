@@ -11,36 +11,10 @@
 #include <vector>
 
 #include "stages/support/hash/hash.h"
-#include "tests/commands/program.h"
+#include "tests/commands/nesting.h"
 
 namespace lamina::test {
 namespace {
-
-using CsvCells = std::vector<std::vector<std::string>>;
-
-/// Of files without quotes.
-CsvCells cells_of(const std::string& text) {
-  CsvCells rows;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    std::istringstream cells(line + ",");
-    rows.emplace_back();
-    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
-  }
-  return rows;
-}
-
-class Nesting : public ::testing::Test {
- protected:
-  void SetUp() override {
-    write_box(folder_ / "bar.stl", {0, 0, 0}, {30, 6, 4});
-    write_box(folder_ / "cube.stl", {5, 5, 5}, {15, 15, 15});
-  }
-  Outcome run(const std::string& line) const { return run_lamina(words_of(line), folder_.path()); }
-  std::string text(const std::string& name) const { return read_text(folder_ / name); }
-  Directory folder_;
-};
 
 struct PlacedBox {
   double x, y, width, depth;
@@ -222,7 +196,7 @@ TEST_F(Nesting, WhatDoesNotFitIsNamedWithTheReason) {
   ASSERT_EQ(made.code, 0) << made.err;
   const auto left = nlohmann::json::parse(made.out).at("left_out");
   ASSERT_EQ(left.size(), 3u);
-  EXPECT_NE(left[0].at("reason").get<std::string>().find("fit the free bed in none of 4 turns"), std::string::npos);
+  EXPECT_NE(left[0].at("reason").get<std::string>().find("do not fit the free bed in any of 4 turns"), std::string::npos);
   EXPECT_NE(left[1].at("reason").get<std::string>().find("is 150 mm high, and the machine builds 100 mm"), std::string::npos);
   EXPECT_NE(left[2].at("reason").get<std::string>().find("its group 'g' does not fit one build"), std::string::npos);
   const Outcome one = run("nest cube.stl --copies 90 --machine nuferbj --builds 1 --dry-run --json --quiet");
@@ -239,9 +213,9 @@ TEST_F(Nesting, FixedPartsWithoutABuildAreReported) {
   EXPECT_EQ(json.at("builds")[0].at("parts"), 1);
   const auto& left = json.at("left_out");
   ASSERT_EQ(left.size(), 2u);
-  EXPECT_EQ(left[0].at("row"), 2);
-  EXPECT_EQ(left[0].at("reason"), "no space in 1 build (--builds)");
-  EXPECT_NE(left[1].at("reason").get<std::string>().find("fit the free bed in none of 4 turns"), std::string::npos);
+  EXPECT_EQ(left[0].at("row"), 1) << "the part with a position has the build";
+  EXPECT_EQ(left[0].at("reason"), "no build of its material in 1 build (--builds)");
+  EXPECT_NE(left[1].at("reason").get<std::string>().find("do not fit the free bed in any of 4 turns"), std::string::npos);
 }
 
 TEST_F(Nesting, ColumnsDecideWherePartsAre) {
@@ -269,7 +243,7 @@ TEST_F(Nesting, ColumnsDecideWherePartsAre) {
 
 TEST_F(Nesting, WrongUseIsOneLine) {
   write_text(folder_ / "orders.csv", "file,fixed\nbar.stl,10 10\nbar.stl,20 12\n");
-  expect_refused("nest orders.csv --bed 100x100 -o week", 2, "overlaps another fixed part", folder_);
+  expect_refused("nest orders.csv --bed 100x100 -o week", 2, "nearer than the gap of 5 mm to another fixed part", folder_);
   expect_refused("nest bar.stl --bed 100x100 --margin 50 -o week", 2, "leave nothing of the bed", folder_);
   expect_refused("nest bar.stl --bed 100x100 --keep-out 0,0,100,100 -o week", 2, "leave nothing of the bed", folder_);
   expect_refused("nest bar.stl cube.stl --copies 1,2,3 -o week", 2, "--copies: has 3 numbers for 2 part files", folder_);

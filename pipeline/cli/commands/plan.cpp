@@ -12,6 +12,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"
+#include "pipeline/nest/plate.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/pores/pore_analysis.h"
 #include "pipeline/run/run.h"
@@ -108,6 +109,9 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   for (const std::string& note : notes_on_needs(row.product, arguments, *job)) {
     if (!job->quiet) context.say("note: " + note);
   }
+  if (arguments.has("--nest")) {
+    if (Status status = nest_job(row.product, *job); !status) return status;
+  }
   Result<Resolved> resolved = resolve(*job, row.product);
   if (!resolved) return resolved.error();
   std::vector<std::string> left;
@@ -170,6 +174,7 @@ constexpr std::string_view kJetBasic =
     "--saturation --inspect --job --resume --memory";
 
 const OptionSpec kJetSwitches[] = {
+    {"--nest", "", "arrange parts by their outlines, turned about z, in one build; see lamina nest", "", "Parts"},
     {"--material", "NAME|NAME,...", "powder of all parts, or one per part in order", "", "Machine and binder"},
     {"--quote", "CSV", "write material and cost per part as CSV (with --machine)", "", "Machine and binder"},
     {"--resume", "", "continue an interrupted job; layers with a valid hash are kept", "", "Run"},
@@ -277,6 +282,7 @@ constexpr std::string_view kExtrudeBasic =
     "--copies --at --rotate --scale --unit --heights --job --resume";
 
 const OptionSpec kExtrudeSwitches[] = {
+    {"--nest", "", "arrange parts by their outlines, turned about z, in one build; see lamina nest", "", "Parts"},
     {"--resume", "", "continue an interrupted job; complete layers are kept", "", "Run"},
     {"--overwrite", "", "replace an existing file", "", "Run"},
     {"--dry-run", "", "report material and printing time without writing output", "", "Run"}};

@@ -6,12 +6,13 @@
 
 namespace lamina::pipeline {
 
-std::string Progress::rate(std::uint32_t done, std::uint32_t total, std::uint32_t before, double seconds) {
-  std::string text = fmt::format("{}/{} layers", done, total);
+std::string Progress::rate(std::uint32_t done, std::uint32_t total, std::uint32_t before, double seconds,
+                           std::string_view unit) {
+  std::string text = fmt::format("{}/{} {}", done, total, unit);
   const double planned = done - before;
   if (planned > 0 && seconds > 0) {
     const double rate = planned / seconds;
-    text += fmt::format(", {:.{}f} layers/s", rate, rate < 100 ? 1 : 0);
+    text += fmt::format(", {:.{}f} {}/s", rate, rate < 100 ? 1 : 0, unit);
     if (done < total) text += fmt::format(", {} left", readable_seconds((total - done) / rate));
   }
   return text;
@@ -24,7 +25,7 @@ std::string Progress::draw(std::string_view what, double share) {
 
 std::string Progress::begin(std::string_view what) { return style_ == Style::kBar ? draw(what, 0) : ""; }
 
-std::string Progress::report(std::uint32_t done, std::uint32_t total) {
+std::string Progress::report(std::uint32_t done, std::uint32_t total, std::string_view unit) {
   using namespace std::chrono_literals;
   if (style_ == Style::kSilent) return {};
   const Clock::time_point now = Clock::now();
@@ -41,7 +42,7 @@ std::string Progress::report(std::uint32_t done, std::uint32_t total) {
   if (bar ? silent < 100ms : silent < 5s && (tenths <= tenths_reported_ || silent < 1s)) return {};
   reports_ = now;
   tenths_reported_ = tenths;
-  const std::string text = rate(done, total, before_, std::chrono::duration<double>(now - started_).count());
+  const std::string text = rate(done, total, before_, std::chrono::duration<double>(now - started_).count(), unit);
   return bar ? draw(text, total > 0 ? static_cast<double>(done) / total : 1) : text + "\n";
 }
 

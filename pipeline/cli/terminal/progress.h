@@ -20,14 +20,15 @@ class Progress {
 
   /// Starts a phase without numbers: "loading parts".
   std::string begin(std::string_view what);
-  /// Sets the number of finished layers; the first call sets the number kept from before.
-  std::string report(std::uint32_t done, std::uint32_t total);
+  /// Sets the number of finished layers, or of another unit; the first call sets the number kept from before.
+  std::string report(std::uint32_t done, std::uint32_t total, std::string_view unit = "layers");
   /// The text that erases the bar before another line.
   std::string clear() { return line_.clear(); }
 
   /// The text after the bar and in the lines: "1200/4800 layers, 312.5 layers/s, 11.5 s left".
   /// before  finished layers from before, not counted in the seconds
-  static std::string rate(std::uint32_t done, std::uint32_t total, std::uint32_t before, double seconds);
+  static std::string rate(std::uint32_t done, std::uint32_t total, std::uint32_t before, double seconds,
+                          std::string_view unit = "layers");
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -39,7 +39,7 @@ TEST_F(OrderTables, HaveColumnsInAnyOrder) {
       "\r\n"
       "1002,,b.stl,,,,,any,,,,,,\r\n");
   ASSERT_TRUE(table.ok()) << table.error().message;
-  ASSERT_EQ(table->faults.size(), 1u) << "12 copies at one position";
+  ASSERT_EQ(table->faults.size(), 2u) << "12 copies at one position, which is in a group";
   const auto fine = read(
       "file,order,copies,due,fixed,turns,down,customer,shelf\na.stl,1,1,2026-12-24,10 20.5,0 45,+x,\"K, G\",A3\nb.stl,2,7,,,any,,,\n");
   ASSERT_TRUE(fine.ok() && fine->faults.empty()) << fine->faults[0];
@@ -47,7 +47,7 @@ TEST_F(OrderTables, HaveColumnsInAnyOrder) {
   EXPECT_EQ(date_text(*fine->rows[0].due), "2026-12-24");
   EXPECT_EQ((*fine->rows[0].fixed_mm)[1], 20.5);
   EXPECT_EQ(fine->rows[0].turns, (std::vector<MicroDegrees>{0, 45'000'000}));
-  EXPECT_TRUE(fine->rows[0].down_positive);
+  EXPECT_EQ(fine->rows[0].rest_deg, (std::array<double, 2>{0, 90}));
   EXPECT_EQ(fine->rows[0].customer, "K, G");
   EXPECT_EQ(fine->more_columns, std::vector<std::string>{"shelf"});
   EXPECT_EQ(fine->rows[0].more, std::vector<std::string>{"A3"});
@@ -155,6 +155,12 @@ TEST_F(OrderTables, NameFaultsOfRowsAndTables) {
   one("file,order\na.stl,7\nb.stl,7\na.stl,7\n", "orders.csv:4:7: order '7' has this file in line 2 already");
   one("file,order,priority\na.stl,7,1\nb.stl,7,2\n", "orders.csv:3:9: order '7' has priority 1 in line 2");
   one("file,group,material\na.stl,g,steel\nb.stl,g,bronze\n", "orders.csv:3:7: group 'g' is of material 'steel'");
+  one("file,group,priority\na.stl,g,1\nb.stl,g,2\n", "orders.csv:3:9: group 'g' has priority 1 in line 2");
+  one("file,group,fixed\na.stl,g,10 10\n", "orders.csv:2:7: is of a part with a position");
+  one("file,copy\na.stl,3\n", "orders.csv:1:6: column 'copy': did you mean 'copies'?");
+  one("file,Prioritaet\na.stl,3\n", "orders.csv:1:6: column 'Prioritaet': did you mean 'priority'?");
+  one("file,orders\na.stl,3\n", "orders.csv:1:6: column 'orders': did you mean 'order'?");
+  EXPECT_EQ(faults("File,COPIES,shelf\na.stl,3,A\n"), std::vector<std::string>()) << "capitals are as small letters";
   one("file,fixed,copies\na.stl,10 10,2\n", "orders.csv:2:7: one position is for one copy");
 }
 
