@@ -69,9 +69,9 @@ Status check_line(const std::string& list, const PartRequest& part, const CsvTex
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     return error == std::errc() && std::abs(value - mm) < 1e-6;
   };
-  const bool same = cell_of(parts, number, "file") == fs::path(part.path).filename().string() &&
-                    is_at("x_mm", (*part.at_mm)[0]) && is_at("y_mm", (*part.at_mm)[1]) &&
-                    !cell_of(parts, number, "serial").empty();
+  const bool same =
+      parts[number].size() == parts[0].size() && cell_of(parts, number, "file") == fs::path(part.path).filename().string() &&
+      is_at("x_mm", (*part.at_mm)[0]) && is_at("y_mm", (*part.at_mm)[1]) && !cell_of(parts, number, "serial").empty();
   if (same) return {};
   return Error{Fault::kInput, fmt::format("{}:{}: is not part {} of plate.toml; undo the changes, or make the build anew", list,
                                           number + 1, number)};

@@ -344,7 +344,9 @@ Status Nester::make_builds(NestPlan& plan) {
   for (const auto& [material, of] : materials) {
     const bool has_build = std::ranges::any_of(plan.builds, [&](const NestBuild& build) { return build.material == material; });
     const std::string full = has_build ? "no space in" : "no build of its material in";
-    const std::string why = fmt::format("{} {} build{} (--builds)", full, space_.max_builds, space_.max_builds == 1 ? "" : "s");
+    const std::string why =
+        space_.into ? "no space in the build"
+                    : fmt::format("{} {} build{} (--builds)", full, space_.max_builds, space_.max_builds == 1 ? "" : "s");
     for (const std::uint32_t row : of.fixed) plan.left_out.push_back({row, rows_[row].copies, why});
     for (const arrange::Demand& demand : of.demands) {
       if (demand.copies == 0 || rows_[demand.row].fills) continue;

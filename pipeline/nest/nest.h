@@ -28,6 +28,7 @@ struct NestSpace {
   std::int64_t cell = 0;            // of rows of bits; 0: a two thousandth of the bed's longer side
   std::vector<MicroDegrees> turns;  // of rows that state none
   std::uint32_t max_builds = UINT32_MAX;
+  bool into = false;  // one build, which is there already
 };
 
 /// A copy in a build.

@@ -89,7 +89,7 @@ CsvTable parts_table(const NestBuild& build, const OrderTable& table, const std:
     csv.push_back({fmt::format("{}", ++number), serials[copy.row][copy.copy], row.order, row.customer, file_name(row),
                    number_text(copy.x_mm), number_text(copy.y_mm), fmt::format("{:g}", static_cast<double>(copy.turn) * 1e-6),
                    fmt::format("{:.3f}", copy.width_mm), fmt::format("{:.3f}", copy.depth_mm),
-                   fmt::format("{:.3f}", copy.height_mm), row.due ? date_text(*row.due) : "", row.note,
+                   fmt::format("{:.3f}", copy.height_mm), row.due ? date_text(*row.due) : "", row.note, build.material,
                    number_text(row.keep_apart_mm)});
     if (priced) csv.back().push_back(money(build.use->quote.parts[number - 1].cents()));
   }

@@ -18,7 +18,7 @@ constexpr const char* kStyle =
     "@page{size:A4;margin:10mm}body{font:8pt sans-serif;margin:0;color:#111}h1{font-size:13pt;margin:0 0 1mm}"
     "p{margin:0 0 2mm}svg{width:100%;height:auto;display:block}.views{display:grid;grid-template-columns:1fr;gap:2mm}"
     ".above{max-width:120mm;margin:auto}.parts{columns:2;column-gap:5mm;margin-top:2mm}.top{margin-top:3mm}"
-    ".part{display:grid;grid-template-columns:7mm 1fr 1.3fr 1fr 17mm 9mm;column-gap:1mm;border-bottom:0.1mm solid #bbb;break-inside:avoid;"
+    ".part{display:grid;grid-template-columns:7mm 17mm 1.5fr 1fr 16mm 8mm;column-gap:1mm;border-bottom:0.1mm solid #bbb;break-inside:avoid;"
     "font-size:6.5pt;line-height:1.35}.part b{text-align:right;padding-right:1.5mm}.part span{overflow:hidden;white-space:nowrap;"
     "text-overflow:ellipsis}.sign{display:grid;grid-template-columns:1fr 1fr 1fr;gap:6mm;margin-top:9mm;break-inside:avoid}"
     ".sign div{border-top:0.3mm solid #111;padding-top:1mm}code{font-size:7pt}";
@@ -95,8 +95,12 @@ std::string view_from_the_side(const NestPlan& plan, const NestBuild& build) {
         "stroke-width=\"0.1%\"/>",
         copy.x_mm, height - copy.height_mm, copy.width_mm, copy.height_mm);
     const double x = copy.x_mm + copy.width_mm / 2, y = height - copy.height_mm + size;
-    const std::pair cell{std::lround(x / size / 2), std::lround(y / size)};
-    if (!taken.insert(cell).second) continue;
+    const std::pair cell{std::lround(x / size), std::lround(y / size)};
+    bool free = true;
+    for (long dx = -2; dx <= 2; ++dx)
+      for (long dy = -1; dy <= 1; ++dy) free = free && !taken.contains({cell.first + dx, cell.second + dy});
+    if (!free) continue;
+    taken.insert(cell);
     numbers += fmt::format("<text x=\"{:.6g}\" y=\"{:.6g}\">{}</text>", x, std::min(y, height), i + 1);
   }
   svg += fmt::format("<g font-size=\"{:.4g}\" text-anchor=\"middle\">", size) + numbers + "</g>";

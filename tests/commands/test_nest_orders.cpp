@@ -28,7 +28,8 @@ std::int64_t cents_of(const std::string& text) { return std::llround(std::stod(t
 std::int64_t sum_of(const CsvCells& table, const std::string& column, const std::string& build = "") {
   std::int64_t sum = 0;
   for (std::size_t i = 1; i < table.size(); ++i)
-    if (build.empty() || table[i][column_of(table, "build")] == build) sum += cents_of(table[i][column_of(table, column)]);
+    if (build.empty() || table[i].at(column_of(table, "build")) == build)
+      sum += cents_of(table[i].at(column_of(table, column)));
   return sum;
 }
 
@@ -67,7 +68,7 @@ TEST_F(NestOrders, PricesAddUpAndAreThoseOfTheRun) {
   const CsvCells parts = cells_of(text("week/build-1/parts.csv"));
   std::map<std::string, std::pair<std::int64_t, std::int64_t>> prices;
   for (std::size_t i = 1; i < parts.size(); ++i) {
-    const std::int64_t cents = cents_of(parts[i][column_of(parts, "price_EUR")]);
+    const std::int64_t cents = cents_of(parts[i].at(column_of(parts, "price_EUR")));
     auto& [low, high] = prices.try_emplace(parts[i][4], cents, cents).first->second;
     low = std::min(low, cents), high = std::max(high, cents);
   }
@@ -106,7 +107,7 @@ TEST_F(NestOrders, AddedPartsMoveNothing) {
   // What finds no position changes nothing.
   write_box(folder_ / "plate.stl", {0, 0, 0}, {60, 60, 2});
   const std::string job = text("week/build-1/plate.toml");
-  expect_refused("nest --add plate.stl --into week/build-1", 2, "finds no position in week/build-1", folder_);
+  expect_refused("nest --add plate.stl --into week/build-1", 2, "no space in the build; nothing was changed", folder_);
   expect_refused("nest --add rush.stl --into week", 2, "has no plate.toml", folder_);
   expect_refused("nest --add rush.stl", 2, "--into DIR is missing", folder_);
   expect_refused("nest --add rush.stl --into week/build-1 --gap 9", 2, "--gap is that of the build", folder_);
@@ -116,13 +117,13 @@ TEST_F(NestOrders, AddedPartsMoveNothing) {
 // The table may have been edited, the build named in another way, and there may be several ways to be wrong.
 TEST_F(NestOrders, AddedPartsAreCheckedAgainstTheBuild) {
   write_text(folder_ / "two.csv", "file,copies,order,down,material\nbar.stl,2,A 1,+x,steel\ncube.stl,1,B,,steel\n");
-  ASSERT_EQ(run("nest two.csv --bed 200x200 --rotate 0,0,30 --keep-out 0,0,200,80 -o week").code, 0);
+  ASSERT_EQ(run("nest two.csv --bed 200x200 --turns 30 --keep-out 0,0,200,80 -o week").code, 0);
   write_box(folder_ / "rush.stl", {0, 0, 0}, {4, 3, 2});
   ASSERT_EQ(run("nest --add rush.stl --into week/build-1/ --threads 1").code, 0);
   const CsvCells parts = cells_of(text("week/build-1/parts.csv")), orders = cells_of(text("week/orders.csv"));
   ASSERT_EQ(parts.size(), 5u);
-  EXPECT_EQ(parts[1][1], "A_1-001") << "serial numbers have no spaces";
-  EXPECT_EQ(parts[1][10], "30.000") << "it stands on its end";
+  EXPECT_EQ(parts[2][1], "A_1-001") << "serial numbers have no spaces";
+  EXPECT_EQ(parts[2][10], "30.000") << "it stands on its end";
   EXPECT_GE(std::stod(parts.back()[6]), 80) << "keep-outs are remembered";
   EXPECT_EQ(orders.back()[column_of(orders, "material")], "steel");
   EXPECT_EQ(orders.back()[column_of(orders, "build")], "1");
@@ -130,7 +131,7 @@ TEST_F(NestOrders, AddedPartsAreCheckedAgainstTheBuild) {
                  folder_);
   const std::string list = text("week/build-1/parts.csv");
   write_text(folder_ / "week/build-1/parts.csv", std::string(list).replace(list.find("bar.stl"), 7, "bat.stl"));
-  expect_refused("nest --add rush.stl --into week/build-1", 3, "parts.csv:2: is not part 1 of plate.toml", folder_);
+  expect_refused("nest --add rush.stl --into week/build-1", 3, "parts.csv:3: is not part 2 of plate.toml", folder_);
 }
 
 TEST_F(NestOrders, HighPriorityComesFirstInAnyMaterial) {

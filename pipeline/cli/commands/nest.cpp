@@ -250,6 +250,7 @@ Outcome add_parts(const Arguments& arguments, Context& context) {
   if (Status status = read_space_options(arguments, *space); !status) return status.error();
   if (Status status = read_keep_outs(build->keep_outs, *space); !status) return status.error();
   space->max_builds = 1;
+  space->into = true;
   std::uint32_t count = 0;
   if (Status status = arguments.read("--threads", {0, 4096}, count); !status) return status.error();
   std::optional<tbb::global_control> threads;
