@@ -123,15 +123,16 @@ def libnest2d(peer, wanted, hulls, seconds):
     return int(answer[0]), int(answer[1]), float(answer[2])
 
 
-def compare(lamina, table, out, wanted, sizes, hulls, peer=None):
+def compare(lamina, table, wanted, sizes, hulls, peer=None):
     """A line of the table, and whether a target is missed."""
     write_orders(table, [(file, count, f"{i + 1}") for i, (file, count) in enumerate(wanted)])
     parts = [sizes[file] for file, count in wanted for _ in range(count)]
-    _, builds, _ = nest(lamina, table, out, "--machine", "production-1200")
     began = time.monotonic()  # of the arrangement alone, as for the peer
-    subprocess.run([lamina, "nest", table, "--machine", "production-1200", "--dry-run", "--quiet"], check=True)
+    answer = subprocess.run([lamina, "nest", table, "--machine", "production-1200", "--dry-run", "--json", "--quiet"], check=True, text=True,
+                            stdout=subprocess.PIPE).stdout
     seconds = time.monotonic() - began
-    rows, placed = levels_in_rows(parts), sum(len(build) for build in builds)
+    builds = json.loads(answer)["builds"]
+    rows, placed = levels_in_rows(parts), sum(build["parts"] for build in builds)
     ratio = rows / len(builds)
     line = f"{len(parts)} | {rows} | {len(builds)} | {ratio:.2f} |"
     if hulls is None:
@@ -242,7 +243,7 @@ def main(arguments=()):
         for order in range(10):
             rng_order = random.Random(100 + order)
             wanted = [(rng_order.choice(files), rng_order.randint(1, 12)) for _ in range(60)]
-            line, late = compare(lamina, table, out, wanted, sizes, hulls, peer)
+            line, late = compare(lamina, table, wanted, sizes, hulls, peer)
             lines.append(f"| {order + 1} | {line}")
             missed += late
         lines += ["", "The same for ten orders of 4 kinds, each in one row of the table, which suits rows of boxes. Without a target: with a gap of 5 mm, "
@@ -250,7 +251,7 @@ def main(arguments=()):
         for order in range(10):
             kinds = rng.sample(files[:7], 4)
             wanted = [(file, 10 * rng.randint(20, 80)) for file in kinds]
-            line, _ = compare(lamina, table, out, wanted, sizes, None)
+            line, _ = compare(lamina, table, wanted, sizes, None)
             lines.append(f"| {order + 1} | {line}")
         many = []
         for kind in range(300):

@@ -342,7 +342,7 @@ Status Nester::make_builds(NestPlan& plan) {
     if (Status status = add_build(next->first, next->second, plan); !status) return status;
   }
   for (const auto& [material, of] : materials) {
-    const bool has_build = std::ranges::any_of(plan.builds, [&](const NestBuild& build) { return build.material == material; });
+    const bool has_build = std::ranges::count(plan.builds, material, &NestBuild::material) > 0;
     const std::string full = has_build ? "no space in" : "no build of its material in";
     const std::string why =
         space_.into ? "no space in the build"
