@@ -24,12 +24,18 @@ struct SampledLayer {
   LayerRecord record;
 };
 
+/// The first layer, which is spread on the base, and the last one stand for themselves.
 std::vector<SampledLayer> samples_of(std::uint32_t layers) {
   const std::uint32_t count = std::min(layers, kSampledLayers);
   std::vector<SampledLayer> samples(count);
+  const auto begin_of = [&](std::uint32_t i) {
+    if (layers <= kSampledLayers || i == 0) return i;
+    if (i + 1 >= count) return layers - (count - i);
+    return 1 + static_cast<std::uint32_t>(std::uint64_t{layers - 2} * (i - 1) / (count - 2));
+  };
   for (std::uint32_t i = 0; i < count; ++i) {
-    samples[i].begin = static_cast<std::uint32_t>(std::uint64_t{layers} * i / count);
-    samples[i].end = static_cast<std::uint32_t>(std::uint64_t{layers} * (i + 1) / count);
+    samples[i].begin = begin_of(i);
+    samples[i].end = begin_of(i + 1);
   }
   return samples;
 }

@@ -16,7 +16,7 @@ namespace lamina::test {
 namespace {
 
 constexpr const char* kPrices =
-    "[cost]\nhour_price = 30\nbinder_price_l = 200\npowder_price_kg = 50\npowder_kg_l = 4.5\npowder_reuse = 0.9\n";
+    "[cost]\nhour_price = 30\nbinder_price_l = 200\npowder_price_kg = 50\npowder_kg_l = 4.5\npowder_reuse = 0.9\n[powder]\nbase_layers = 7\n";
 
 std::size_t column_of(const CsvCells& table, const std::string& name) {
   return static_cast<std::size_t>(std::ranges::find(table[0], name) - table[0].begin());
@@ -172,6 +172,8 @@ TEST_F(NestOrders, FillersTakeWhatIsLeftOfTheBuilds) {
   ASSERT_EQ(alone.at("builds").size(), filled.at("builds").size());
   EXPECT_GT(filled.at("copies"), alone.at("copies"));
   EXPECT_TRUE(filled.at("left_out").empty());
+  write_box(folder_ / "large.stl", {0, 0, 0}, {40, 40, 2});
+  EXPECT_EQ(builds("orders.csv --fill large.stl").at("builds").size(), alone.at("builds").size()) << "orders come first";
   const auto one = builds("--fill cube.stl"), many = builds("cube.stl --copies 999 --builds 1");
   ASSERT_EQ(one.at("builds").size(), 1u);
   EXPECT_EQ(one.at("builds")[0].at("parts"), many.at("builds")[0].at("parts"));
