@@ -130,10 +130,8 @@ Status Console::give(const Json& value) { return print(json_line(with_schema(val
 void Console::progress(const ProgressEvent& event) {
   using Stage = ProgressEvent::Stage;
   const bool counted = event.stage == Stage::kLayers || event.stage == Stage::kBuilds;
-  if (counted) {
-    lose_patience();
-    keep_on_signals();
-  }
+  if (counted) keep_on_signals();
+  if (event.stage == Stage::kLayers) lose_patience();  // builds are removed after a signal, which may take longer
   if (!progress_) {
     using Style = Progress::Style;
     progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);

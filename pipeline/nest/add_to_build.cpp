@@ -194,6 +194,7 @@ Status write_added(const NestOutput& output, const OrderTable& table, std::size_
       add_to_orders(output.directory, table, rows, plan, *orders);
       file.emplace(std::move(*opened));
       status = file->append(cost::csv_text(*orders));
+      if (status) status = file->flush();
     } else {
       status = opened.error();
     }

@@ -308,6 +308,7 @@ Status write_nest(const NestOutput& output, const OrderTable& table, const Job& 
     if (cancel) status = Error{Fault::kInterrupted, fmt::format("-o {}: interrupted; nothing was written", output.directory)};
   }
   if (status) status = orders->append(cost::csv_text(orders_table(plan, table)));
+  if (status) status = orders->flush();
   if (status) status = finish_builds(output, count);
   fs::remove_all(begun, error);
   if (!status) return status;

@@ -1,13 +1,16 @@
 // tests/commands/test_nest_orders.cpp: what builds and parts cost, parts that are added to a build, builds that are filled.
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <thread>
 
 #include "tests/commands/nesting.h"
 #include "tests/load/archives.h"
@@ -48,6 +51,7 @@ TEST_F(NestOrders, PricesAddUpAndAreThoseOfTheRun) {
   ASSERT_EQ(made.code, 0) << made.err;
   const auto json = nlohmann::json::parse(made.out);
   const CsvCells orders = cells_of(text("week/orders.csv"));
+  ASSERT_GE(json.at("builds").size(), 1u);
   std::int64_t of_json = 0;
   for (const auto& price : json.at("prices")) of_json += std::llround(price.at("price").get<double>() * 100);
   EXPECT_EQ(sum_of(orders, "price_EUR"), of_json);
@@ -72,6 +76,7 @@ TEST_F(NestOrders, PricesAddUpAndAreThoseOfTheRun) {
     auto& [low, high] = prices.try_emplace(parts[i][4], cents, cents).first->second;
     low = std::min(low, cents), high = std::max(high, cents);
   }
+  EXPECT_EQ(prices.size(), 2u) << "of two files";
   for (const auto& [file, price] : prices) EXPECT_LE(price.second - price.first, 3) << file;
 }
 
@@ -160,6 +165,20 @@ TEST_F(NestOrders, NothingOfOthersIsReplaced) {
   EXPECT_EQ(text("week/build-1/plate.toml"), job);
   EXPECT_EQ(text("week/orders.csv"), orders);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "week/.lamina-nest"));
+}
+
+TEST_F(NestOrders, AnInterruptedRunLeavesNothing) {
+  const auto stop = [&](int process) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (std::chrono::steady_clock::now() < deadline && !std::filesystem::exists(folder_ / "week/.lamina-nest/build-1"))
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ::kill(process, SIGINT);
+  };
+  const Outcome made =
+      run_lamina(words_of("nest cube.stl --copies 900 --machine nuferbj --threads 1 -o week"), folder_.path(), stop);
+  ASSERT_EQ(made.code, 130) << made.err;
+  EXPECT_NE(made.err.find("lamina: -o week: interrupted; nothing was written\n"), std::string::npos) << made.err;
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "week"));
 }
 
 TEST_F(NestOrders, FillersTakeWhatIsLeftOfTheBuilds) {
