@@ -25,12 +25,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using CsvText = std::vector<std::vector<std::string>>;
-
 fs::path orders_of(const std::string& folder) { return fs::path(whole_path(folder)).parent_path() / "orders.csv"; }
 
 /// "" for a column that the table does not have.
-std::string cell_of(const CsvText& table, std::size_t row, std::string_view column) {
+std::string cell_of(const CsvTable& table, std::size_t row, std::string_view column) {
   const auto found = std::ranges::find(table[0], column);
   const auto at = static_cast<std::size_t>(found - table[0].begin());
   return found == table[0].end() || at >= table[row].size() ? std::string() : table[row][at];
@@ -44,7 +42,7 @@ std::vector<std::string> words_in(const std::string& text) {
 }
 
 /// A part of a build as a row with its position.
-OrderRow row_of(const PartRequest& part, const CsvText& parts, std::size_t number) {
+OrderRow row_of(const PartRequest& part, const CsvTable& parts, std::size_t number) {
   OrderRow row;
   row.path = part.path;
   row.fixed_mm = part.at_mm;
@@ -62,7 +60,7 @@ OrderRow row_of(const PartRequest& part, const CsvText& parts, std::size_t numbe
 }
 
 /// errors  kInput: the line is not that of the part
-Status check_line(const std::string& list, const PartRequest& part, const CsvText& parts, std::size_t number) {
+Status check_line(const std::string& list, const PartRequest& part, const CsvTable& parts, std::size_t number) {
   const auto is_at = [&](const char* column, double mm) {
     const std::string text = cell_of(parts, number, column);
     double value = 0;
@@ -143,19 +141,19 @@ Result<WrittenBuild> read_build(const std::string& folder) {
 namespace {
 
 /// The orders of a folder with a build as it is now. orders  not empty
-void add_to_orders(const std::string& folder, const OrderTable& table, std::size_t rows, const NestPlan& plan,
-                   CsvText& orders) {
+void add_to_orders(const std::string& folder, const OrderTable& table, std::size_t rows, const SerialNumbers& serials,
+                   const NestPlan& plan, CsvTable& orders) {
   const std::string build = fs::path(whole_path(folder)).filename().string();
   const std::string number = build.starts_with("build-") ? build.substr(6) : build;
-  const CsvText made = orders_table(plan, table);
+  const CsvTable made = orders_table(plan, table, serials);
   // Serial numbers to prices, of the build as it is now.
   std::map<std::string, std::string> price;
   std::string currency;
   for (const std::string& column : made[0])
     if (column.starts_with("price_each_")) currency = column.substr(11);
   for (std::size_t i = 1; i < made.size(); ++i) {
-    const auto serials = words_in(cell_of(made, i, "serials")), each = words_in(cell_of(made, i, "price_each_" + currency));
-    for (std::size_t k = 0; k < serials.size() && !each.empty(); ++k) price[serials[k]] = each[std::min(k, each.size() - 1)];
+    const auto numbers = words_in(cell_of(made, i, "serials")), each = words_in(cell_of(made, i, "price_each_" + currency));
+    for (std::size_t k = 0; k < numbers.size() && !each.empty(); ++k) price[numbers[k]] = each[std::min(k, each.size() - 1)];
   }
   const auto set = [&](std::size_t row, const std::string& column, const std::string& text) {
     const auto found = std::ranges::find(orders[0], column);
@@ -183,15 +181,16 @@ void add_to_orders(const std::string& folder, const OrderTable& table, std::size
 Status write_added(const NestOutput& output, const OrderTable& table, std::size_t rows, const Job& options, NestPlan& plan) {
   const fs::path whole = whole_path(output.directory), begun = whole / ".lamina-nest";
   const std::string title = whole.parent_path().filename().string() + ", " + whole.filename().string();
+  const SerialNumbers serials = serial_numbers(table);
   std::error_code error;
   fs::remove_all(begun, error);  // of a killed run
-  Status status = write_build(begun.string(), output, table, options, title, plan, plan.builds[0]);
+  Status status = write_build(begun.string(), output, table, serials, options, title, plan, plan.builds[0]);
   std::optional<File> file;
   if (status && fs::is_regular_file(orders_of(output.directory), error)) {
     auto orders = read_csv(orders_of(output.directory).string());
     auto opened = orders ? File::open(orders_of(output.directory).string()) : Result<File>(orders.error());
     if (opened) {
-      add_to_orders(output.directory, table, rows, plan, *orders);
+      add_to_orders(output.directory, table, rows, serials, plan, *orders);
       file.emplace(std::move(*opened));
       status = file->append(cost::csv_text(*orders));
       if (status) status = file->flush();

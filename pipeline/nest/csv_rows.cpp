@@ -64,7 +64,7 @@ CsvCell CsvRows::cell(std::optional<CsvCell>& fault) {
   return cell;
 }
 
-Result<std::vector<std::vector<std::string>>> read_csv(const std::string& path) {
+Result<std::string> csv_content(const std::string& path) {
   ReadRules rules;
   rules.fault = Fault::kInput;
   rules.max_bytes = kMaxTableBytes;
@@ -72,9 +72,15 @@ Result<std::vector<std::vector<std::string>>> read_csv(const std::string& path) 
   if (!file) return file.error();
   const auto text = file->text();
   if (!text) return text.error();
-  std::string_view content = *text;
-  if (content.starts_with("\xef\xbb\xbf")) content.remove_prefix(3);
-  CsvRows rows(content, ',');
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  const std::string_view whole = *text;
+  return std::string(whole.substr(whole.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0));
+}
+
+Result<std::vector<std::vector<std::string>>> read_csv(const std::string& path) {
+  const auto text = csv_content(path);
+  if (!text) return text.error();
+  CsvRows rows(*text, ',');
   std::vector<std::vector<std::string>> table;
   std::vector<CsvCell> cells;
   std::optional<CsvCell> open;

@@ -39,6 +39,9 @@ class CsvRows {
   std::uint32_t line_ = 1, column_ = 1;
 };
 
+/// The text of a file, without a byte order mark of UTF-8. errors  kInput: it cannot be read, or is larger than 64 MiB
+Result<std::string> csv_content(const std::string& path);
+
 /// The cells of a file with commas. errors  kInput: it cannot be read, or a quote is not closed
 Result<std::vector<std::vector<std::string>>> read_csv(const std::string& path);
 

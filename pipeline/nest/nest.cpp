@@ -433,4 +433,12 @@ Result<NestPlan> nest_orders(const std::vector<OrderRow>& rows, const NestSpace&
   return Nester(rows, space, *kinds, bed).run();
 }
 
+void count_fillers(const NestPlan& plan, std::vector<OrderRow>& rows) {
+  for (OrderRow& row : rows)
+    if (row.fills) row.copies = 0;
+  for (const NestBuild& build : plan.builds)
+    for (const NestedCopy& copy : build.copies)
+      if (rows[copy.row].fills) ++rows[copy.row].copies;
+}
+
 }  // namespace lamina::pipeline

@@ -91,6 +91,9 @@ struct NestPlan {
 /// build
 Result<NestPlan> nest_orders(const std::vector<OrderRow>& rows, const NestSpace& space, const Job& options);
 
+/// Sets the copies of rows that fill builds to those that builds have.
+void count_fillers(const NestPlan& plan, std::vector<OrderRow>& rows);
+
 /// Rotation about x, y and z, in degrees, that puts a part with a face down, then turns it about z.
 std::array<double, 3> rotation_of(const OrderRow& row, MicroDegrees turn);
 

@@ -15,7 +15,6 @@
 #include <utility>
 
 #include "pipeline/nest/csv_rows.h"
-#include "stages/support/io/file_reader.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
 
@@ -271,15 +270,9 @@ class OrderReader {
 }  // namespace
 
 Result<OrderTable> read_orders(const std::string& path) {
-  ReadRules rules;
-  rules.fault = Fault::kInput;
-  rules.max_bytes = kMaxTableBytes;
-  auto file = FileReader::open(path, rules);
-  if (!file) return file.error();
-  const auto text = file->text();
+  const auto text = csv_content(path);
   if (!text) return text.error();
-  std::string_view content = *text;
-  if (content.starts_with("\xef\xbb\xbf")) content.remove_prefix(3);
+  const std::string_view content = *text;
   if (content.starts_with("\xff\xfe") || content.starts_with("\xfe\xff") || content.find('\0') != std::string_view::npos)
     return Error{Fault::kInput, fmt::format("{}:1:1: is UTF-16; save the table as \"CSV UTF-8\"", path)};
   OrderReader reader(path, content);
@@ -287,6 +280,8 @@ Result<OrderTable> read_orders(const std::string& path) {
   reader.read_rows();
   return std::move(reader.table);
 }
+
+std::string file_name(const OrderRow& row) { return fs::path(row.path).filename().string(); }
 
 std::optional<std::int32_t> days_of(const std::string& text) {
   int year = 0, month = 0, day = 0;

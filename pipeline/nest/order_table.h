@@ -45,6 +45,9 @@ struct OrderTable {
 /// cost    O(bytes)
 Result<OrderTable> read_orders(const std::string& path);
 
+/// The name of a row's file, without folders.
+std::string file_name(const OrderRow& row);
+
 /// Days since 1970-01-01 of "2026-11-30"; none if it is no date.
 std::optional<std::int32_t> days_of(const std::string& text);
 /// "2026-11-30"

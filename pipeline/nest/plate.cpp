@@ -166,4 +166,16 @@ Status quote_build(const Job& plate, Product product, const NestPlan& plan, Nest
   return {};
 }
 
+Status quote_builds(Product product, const std::vector<OrderRow>& rows, const Job& options, const ProgressCallback& progress,
+                    const std::atomic<bool>& cancel, NestPlan& plan) {
+  const auto count = static_cast<std::uint32_t>(plan.builds.size());
+  for (std::uint32_t b = 0; b < count; ++b) {
+    progress({ProgressEvent::Stage::kBuilds, b, count});
+    if (cancel) return Error{Fault::kInterrupted, "interrupted"};
+    NestBuild& build = plan.builds[b];
+    if (Status status = quote_build(plate_of(build, rows, options), product, plan, build); !status) return status;
+  }
+  return {};
+}
+
 }  // namespace lamina::pipeline

@@ -8,6 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/nest/nest.h"
+#include "pipeline/plan/progress.h"
 #include "stages/data/choices.h"
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
@@ -33,5 +34,9 @@ Job plate_of(const NestBuild& build, const std::vector<OrderRow>& rows, const Jo
 /// errors  of make_plan, and of the layers that are made
 /// cost    that of the layers that are made
 Status quote_build(const Job& plate, Product product, const NestPlan& plan, NestBuild& build);
+
+/// The same for all builds. progress  before each. errors  kInterrupted too
+Status quote_builds(Product product, const std::vector<OrderRow>& rows, const Job& options, const ProgressCallback& progress,
+                    const std::atomic<bool>& cancel, NestPlan& plan);
 
 }  // namespace lamina::pipeline

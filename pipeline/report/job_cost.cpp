@@ -17,7 +17,6 @@ namespace {
 double ml(std::int64_t nl) { return static_cast<double>(nl) * 1e-6; }
 double mm3(std::int64_t nl) { return static_cast<double>(nl) / 1e3; }
 double hours(const Use& use) { return static_cast<double>(use.microseconds) / 3.6e9; }
-std::string money(std::int64_t cents) { return fmt::format("{}.{:02}", cents / 100, cents % 100); }
 
 Json use_json(const Use& use, const Machine::Cost& cost) {
   Json json = {{"set_pixels", use.pixels},
@@ -56,6 +55,8 @@ std::vector<std::int64_t> column(std::int64_t total, const std::vector<std::uint
 }
 
 }  // namespace
+
+std::string money(std::int64_t cents) { return fmt::format("{}.{:02}", cents / 100, cents % 100); }
 
 std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, const Machine::Cost& cost,
                                                           std::span<const QuotedPart> parts) {

@@ -20,6 +20,9 @@
 
 namespace lamina::cost {
 
+/// "12.05" of hundredths, >= 0.
+std::string money(std::int64_t cents);
+
 /// A part as it is named in a table.
 struct QuotedPart {
   std::string name;

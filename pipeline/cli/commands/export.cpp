@@ -6,6 +6,7 @@
 #include "pipeline/cli/keys.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
+#include "pipeline/output/scene_3mf.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/summary.h"
 #include "stages/formats/stl/mesh_stl.h"
@@ -73,20 +74,17 @@ struct Exported {
 };
 
 Result<Exported> write_meshes(const Scene& scene, MeshFormat format, const std::string& output) {
-  const std::string program = fmt::format("lamina {}", version());
   Exported exported;
   for (const Instance& instance : scene.instances) exported.volume_mm3 += scene.meshes[instance.mesh].volume_mm3;
   auto file = File::open(output, {.stream = format == MeshFormat::kStl});
   if (!file) return file.error();
   if (format == MeshFormat::kStl) {
-    const auto counts = formats::stl::write_stl(*file, scene.meshes, scene.instances, program);
+    const auto counts = formats::stl::write_stl(*file, scene.meshes, scene.instances, fmt::format("lamina {}", version()));
     if (!counts) return counts.error();
     exported.triangles = counts->triangles;
     exported.rounding_mm = counts->rounding_mm;
   } else {
-    std::vector<formats::Mesh3mfObject> objects;
-    for (const Mesh& mesh : scene.meshes) objects.push_back({fs::path(mesh.name).filename().string(), mesh.triangles});
-    const auto counts = formats::write_mesh_3mf(*file, objects, scene.instances, program);
+    const auto counts = write_scene_3mf(*file, scene);
     if (!counts) return counts.error();
     exported.left_out = counts->degenerate;
     for (const Instance& instance : scene.instances) exported.triangles += scene.meshes[instance.mesh].triangles.size();

@@ -14,6 +14,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/nest/add_to_build.h"
 #include "pipeline/nest/nest_files.h"
+#include "pipeline/nest/nest_report.h"
 #include "pipeline/nest/order_files.h"
 #include "pipeline/nest/plate.h"
 #include "pipeline/output/temporary_folder.h"
@@ -265,7 +266,7 @@ Outcome add_parts(const Arguments& arguments, Context& context) {
   const auto progress = [&](const ProgressEvent& event) { context.progress(event); };
   Status status;
   if (quotes(arguments)) {
-    status = quote_builds(output.product, table, build->job, progress, context.cancel(), *plan);
+    status = quote_builds(output.product, table.rows, build->job, progress, context.cancel(), *plan);
   } else if (!arguments.has("--dry-run")) {
     status = write_added(output, table, before, build->job, *plan);
   }
@@ -308,11 +309,11 @@ Outcome run_nest(const Arguments& arguments, Context& context) {
     return failure(Fault::kInput, "{}: {}; no part has a build, and nothing was written", one_line(table->rows[first.row].path),
                    first.reason);
   }
-  count_fillers(*plan, *table);
+  count_fillers(*plan, table->rows);
   const auto progress = [&](const ProgressEvent& event) { context.progress(event); };
   Status status;
   if (quotes(arguments)) {
-    status = quote_builds(output.product, *table, *job, progress, context.cancel(), *plan);
+    status = quote_builds(output.product, table->rows, *job, progress, context.cancel(), *plan);
   } else if (!arguments.has("--dry-run")) {
     keep_on_signals();  // builds without their list of orders are removed
     status = write_nest(output, *table, *job, progress, context.cancel(), *plan);
