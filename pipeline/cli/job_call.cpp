@@ -1,0 +1,190 @@
+#include "pipeline/cli/job_call.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <mutex>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/job/errors.h"
+#include "pipeline/job/file.h"
+#include "stages/formats/images/layer_images.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/escape.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// Collects a command's results and its first error; discards its messages.
+class CallContext : public Context {
+ public:
+  CallContext(const ProgressCallback& progress, const std::atomic<bool>& cancel) : progress_(progress), cancel_(cancel) {}
+  void say_text(std::string_view) override {}
+  int complain(const Error& error) override {
+    if (reason.empty()) reason = one_line(error.message);
+    return static_cast<int>(error.fault);
+  }
+  Status print(std::string_view text) override {
+    printed_ += text;
+    return {};
+  }
+  Status give(const Json& value) override {
+    values_.push_back(value);
+    return {};
+  }
+  void progress(const ProgressEvent& event) override { progress_(event); }
+  const std::atomic<bool>& cancel() override { return cancel_; }
+
+  /// The single value, an array of several, or the printed text.
+  Json value() const {
+    if (values_.size() > 1) return values_;
+    if (!values_.empty()) return values_.front();
+    return printed_.empty() ? Json() : Json(printed_);
+  }
+  std::string reason;
+
+ private:
+  const ProgressCallback& progress_;
+  const std::atomic<bool>& cancel_;
+  std::vector<Json> values_;
+  std::string printed_;
+};
+
+/// The arguments with the batch's additions; the last occurrence of an option counts.
+Arguments with_settings(Arguments arguments, const CommandSpec& spec, const CallSettings& settings, const std::string& sync) {
+  const auto add = [&](std::string_view name, const std::string& text = {}) {
+    if (const OptionSpec* option = spec.find(name)) arguments.options.emplace_back(option->flag, text);
+  };
+  if (!settings.output.empty()) add("--output", settings.output);
+  if (!sync.empty() && !arguments.has("--sync")) add("--sync", sync);
+  // Info takes a limit for images alone.
+  const bool takes_memory = spec.name != "info" || std::ranges::any_of(arguments.operands, formats::names_images);
+  if (takes_memory && !arguments.has("--memory")) add("--memory", fmt::format("{}", settings.layer_bytes));
+  // All jobs share one pool, so a job's own thread count would apply to the whole program.
+  add("--threads", "0");
+  add("--json");
+  add("--quiet");
+  if (settings.earlier == CallSettings::Earlier::kContinue) add("--resume");
+  if (settings.earlier == CallSettings::Earlier::kReplace) add("--overwrite");
+  return arguments;
+}
+
+BatchResult run_call(const Command& command, const Arguments& arguments, const ProgressCallback& progress,
+                     const std::atomic<bool>& cancel) {
+  CallContext context(progress, cancel);
+  const Outcome outcome = run(command, arguments, context);
+  BatchResult result;
+  result.code = outcome.error ? context.complain(*outcome.error) : outcome.code;
+  if (result.code != 0) result.reason = context.reason;
+  result.value = context.value();
+  result.recognized = outcome.layers_planned == 0 && outcome.layers_kept > 0;
+  return result;
+}
+
+/// The arguments of a command, made once: many jobs have the same.
+const CommandSpec& spec_for(const Command& command) {
+  static std::mutex mutex;
+  static std::map<const Command*, CommandSpec> specs;
+  const std::lock_guard lock(mutex);
+  const auto [found, is_new] = specs.try_emplace(&command);
+  if (is_new) found->second = spec_of(command);
+  return found->second;
+}
+
+/// A command line of a batch.
+struct CommandLine {
+  const Command* command;
+  const CommandSpec& spec;
+  Arguments arguments;
+};
+
+/// Reads a command line: any command but batch and preview. errors  kUsage: no such command, wrong arguments
+Result<CommandLine> read_command_line(const std::vector<std::string>& words) {
+  const std::string& name = words.front();
+  const Command* command = find_command(name);
+  if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
+  if (command == &batch_command || command->reads_itself)
+    return usage("'{}' cannot be a job of a batch; run it by itself", name);
+  const CommandSpec& spec = spec_for(*command);
+  Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
+  if (!read) return read.error();
+  if (read->help) return usage("--help is no job");
+  return CommandLine{command, spec, std::move(*read)};
+}
+
+/// What was read of a command line: the number of options, of each its number in the spec and its text, and the operands.
+PackedWords packed(const CommandLine& line) {
+  std::vector<std::string> words{std::to_string(line.arguments.options.size())};
+  for (const auto& [flag, text] : line.arguments.options) {
+    const auto option = std::ranges::find(line.spec.options, flag, &OptionSpec::flag);
+    words.push_back(std::to_string(option - line.spec.options.begin()));
+    words.push_back(text);
+  }
+  words.insert(words.end(), line.arguments.operands.begin(), line.arguments.operands.end());
+  return words;
+}
+
+/// The command line of a job that is not refused.
+CommandLine unpacked(const BatchJob& job) {
+  std::vector<std::string> given = job.entry.words.unpacked();
+  const Command* const command = find_command(given.front());
+  CommandLine line{command, spec_for(*command), {}};
+  const std::vector<std::string> words = job.parsed.unpacked();
+  const std::size_t options = 1 + 2 * std::stoul(words.front());
+  for (std::size_t i = 1; i < options; i += 2)
+    line.arguments.options.emplace_back(line.spec.options[std::stoul(words[i])].flag, words[i + 1]);
+  line.arguments.operands.assign(words.begin() + static_cast<std::ptrdiff_t>(options), words.end());
+  line.arguments.given.assign(given.begin() + 1, given.end());
+  return line;
+}
+
+}  // namespace
+
+Result<Call> read_call(const std::vector<std::string>& words) {
+  const Result<CommandLine> line = read_command_line(words);
+  if (!line) return line.error();
+  const auto& [command, spec, arguments] = *line;
+  const Arguments* const read = &arguments;
+  Job planned;
+  if (read->has("--job")) {
+    if (names_stream(read->text("--job"))) return usage("--job: a job of a batch cannot read standard input; name a file");
+    if (Status status = read_job(read->text("--job"), planned); !status) return status.error();
+  }
+
+  Call call;
+  if (const OptionSpec* option = spec.find("--output"); option != nullptr && !read->has("--dry-run")) {
+    call.output_of_job_file = !read->has(option->flag);
+    call.output = call.output_of_job_file ? planned.output : read->text(option->flag);
+    if (command->ending != nullptr) call.ending = command->ending(*read);
+    if (!call.ending && option->value.find("DIR") != std::string::npos) call.ending = "";
+  }
+  call.can_continue = spec.find("--resume") != nullptr && !read->has("--resume");
+  call.can_replace = spec.find("--overwrite") != nullptr && !read->has("--overwrite") && !read->has("--resume");
+  if (const OptionSpec* memory = spec.find("--memory")) {
+    call.layer_bytes = 0;
+    if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
+  }
+  call.parsed = packed(*line);
+  call.inputs = read->operands;
+  for (const auto& [flag, text] : read->options) {
+    if (flag.find("--output") == std::string::npos && !text.empty()) call.inputs.push_back(text);
+  }
+  if (read->operands.empty()) {
+    for (const PartRequest& part : planned.parts) call.inputs.push_back(part.path);
+  }
+  return call;
+}
+
+RunJob job_runner(const std::string& sync) {
+  return [sync](const BatchJob& job, const CallSettings& settings, const ProgressCallback& progress,
+                const std::atomic<bool>& cancel) {
+    const CommandLine line = unpacked(job);
+    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), progress, cancel);
+  };
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,21 @@
+// pipeline/cli/job_call.h: runs a command line of this program as a job, in this process.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/batch/job.h"
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+/// Reads a command line of at least one word: any command but batch and preview.
+/// errors  kUsage: no such command, wrong arguments, a job file that cannot be read
+Result<Call> read_call(const std::vector<std::string>& words);
+
+/// Runs jobs whose command lines read_call() has read. The command's results and its first error are in the result; its
+/// messages are discarded.
+/// sync  when files are flushed to disk, for jobs without a setting of their own; "" for none
+RunJob job_runner(const std::string& sync);
+
+}  // namespace lamina::pipeline
