@@ -134,6 +134,7 @@ class Preparation {
     }
     job.can_continue = call->can_continue;
     job.can_replace = call->can_replace;
+    job.names_sync = call->names_sync;
     job.parsed = std::move(call->parsed);
     find_output(*call, job);
     job.need_bytes = 16 * kMebibyte;
@@ -173,7 +174,8 @@ class Preparation {
     for (const std::string& input : std::set<std::string>(inputs.begin(), inputs.end())) {
       const auto [known, fresh] = digests_.try_emplace(hash_text(input));
       if (fresh && is_file(input)) {
-        if (const Result<FileDigest> read = digest_file(input)) known->second = *read;
+        const Result<FileDigest> read = share_.inputs != nullptr ? share_.inputs->of(input) : digest_file(input);
+        if (read) known->second = *read;
       }
       const std::optional<FileDigest>& digest = known->second;
       if (!digest) continue;

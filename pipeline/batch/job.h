@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/cache/input_digests.h"
 #include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
 #include "stages/support/hash/hash.h"
@@ -60,6 +61,7 @@ struct CallSettings {
   std::string output;                                                          // "" if the command line has none
   std::uint64_t layer_bytes = 0;                                               // layer budget if the command line sets none
   enum class Earlier { kNone, kContinue, kReplace } earlier = Earlier::kNone;  // output of an earlier run
+  bool synced_later = false;  // by the queue: the job does not sync its files
 };
 
 enum class BatchOutcome {
@@ -94,6 +96,8 @@ struct BatchResult {
   std::string first_warning;
   double seconds = 0;
   TreeDigest output;
+  bool digested = false;    // `output` is known without reading the files
+  bool unsynced = false;    // the queue syncs the files
   bool recognized = false;  // kept without a record: the directory holds the finished job
 
   /// Whether the job failed by itself, as opposed to being stopped with the batch.
@@ -110,6 +114,7 @@ struct Call {
   std::optional<std::string> ending;
   bool can_continue = false, can_replace = false;  // output of an earlier run
   std::optional<std::uint64_t> layer_bytes;        // its layer budget; 0 if it accepts one and sets none
+  bool names_sync = false;                         // when its files are synced is stated by the words or the job file
   std::vector<std::string> inputs;                 // words of the command line that may be input files
   PackedWords parsed;                              // for RunJob
 };
@@ -125,6 +130,7 @@ struct BatchJob {
   std::uint32_t below = 0;   // length of the batch's directory in front of an output in it
   bool relative_output = false;                    // the output was given relative to the batch's directory
   bool can_continue = false, can_replace = false;  // output of an earlier run
+  bool names_sync = false;
   std::uint64_t layer_bytes = 0;                   // for the layers in flight
   std::uint64_t need_bytes = 0;   // expected peak memory
   Hash128 id;                     // hash of version, words, output path and all input files
@@ -142,6 +148,7 @@ using RunJob =
 struct BatchShare {
   std::string directory;          // of the batch
   std::uint64_t layer_bytes = 0;  // for each job without a budget of its own
+  InputDigests* inputs = nullptr;  // known hashes of files, which outlive the call; nullptr: own ones
 };
 
 /// Prepares the jobs in the order of the entries. Writes nothing. Some hundred bytes a job stay.

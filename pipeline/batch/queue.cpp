@@ -10,9 +10,12 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
+#include "stages/support/io/file.h"
+#include "stages/support/io/sync.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -22,6 +25,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kGrace{20};            // for a job to stop at its time limit
 constexpr std::chrono::milliseconds kLastGrace{600};  // with the batch: a signal is heard within a second
+constexpr std::chrono::nanoseconds kTrimInterval{50'000'000};
 constexpr Fault kOverdue = Fault::kInput;             // its part cannot be planned within the time limit
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -51,6 +55,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     // Once while there is one thread: with another allocator (jemalloc, a sanitizer's) the first call initialises glibc's own,
     // which takes no lock for it.
     ::malloc_trim(0);
+    if (options_.sync_in_groups) start_syncer();
     for (std::size_t i = 0; i < threads; ++i) start_worker();
     std::unique_lock lock(mutex_);
     while (true) {
@@ -59,14 +64,14 @@ class Queue : public std::enable_shared_from_this<Queue> {
         stop_all();
       }
       check_clocks();
-      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && running_ == 0)) break;
+      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && running_ == 0 && unsynced_ == 0)) break;
       changed_.wait_for(lock, milliseconds(100));
     }
     report(watcher, lock);
     summary_.seconds = seconds_since(start);
     summary_.peak_resident_bytes = peak_resident_bytes();
     // Wakes idle workers so that they exit. A worker shares ownership of this object and may exit later.
-    stopped_ = true;
+    stopped_ = closed_ = true;
     changed_.notify_all();
     changed_.wait_for(lock, grace(), [&] { return workers_ == 0; });
     const BatchRecord released = std::move(record_);  // the next run may open it at once
@@ -80,6 +85,47 @@ class Queue : public std::enable_shared_from_this<Queue> {
   void start_worker() {
     ++workers_;
     std::thread([self = shared_from_this()] { self->work(); }).detach();
+  }
+
+  /// A thread that syncs what has ended since its last sync.
+  void start_syncer() {
+    directory_device_ = device_of(options_.directory);
+    ++workers_;
+    std::thread([self = shared_from_this()] { self->sync_groups(); }).detach();
+  }
+
+  void sync_groups() {
+    const FolderSync folder = FolderSync::of({options_.directory});
+    std::unique_lock lock(mutex_);
+    while (true) {
+      changed_.wait(lock, [&] { return !group_.empty() || closed_; });
+      if (group_.empty()) break;
+      auto group = std::exchange(group_, {});
+      lock.unlock();
+      const Status status = folder.sync();
+      lock.lock();
+      for (auto& [i, result] : group) {
+        --unsynced_;
+        record_end(i, status ? std::move(result) : failed(status.error(), std::move(result)));
+      }
+      changed_.notify_all();
+    }
+    --workers_;
+    changed_.notify_all();
+  }
+
+  /// Whether the files of a job are on the file system that the group is synced on.
+  bool syncs_in_group(const BatchJob& job) const {
+    if (!options_.sync_in_groups || job.names_sync || job.below == 0) return false;
+    std::filesystem::path folder = job.output;
+    std::optional<std::uint64_t> device;
+    while (!(device = device_of(folder.string())) && folder.has_parent_path()) folder = folder.parent_path();
+    return device == directory_device_;
+  }
+
+  static std::optional<std::uint64_t> device_of(const std::string& path) {
+    const std::optional<FileId> id = file_id(path);
+    return id ? std::optional(id->device) : std::nullopt;
   }
 
   void stop_all() {
@@ -156,8 +202,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
       lock.unlock();
       BatchResult result = run_job(i, *slot);
       result.take_warnings();
-      // Returns freed memory to the system before the next job starts.
-      ::malloc_trim(0);
+      trim();
       lock.lock();
       if (slot->abandoned) break;  // another job has its place
       end(i, std::move(result));
@@ -166,11 +211,30 @@ class Queue : public std::enable_shared_from_this<Queue> {
     changed_.notify_all();
   }
 
-  /// Requires the lock.
+  /// Returns freed memory to the system; between small jobs only now and then, for they free little.
+  void trim() {
+    const std::int64_t now = Clock::now().time_since_epoch().count();
+    std::int64_t last = last_trim_;
+    if (now - last < kTrimInterval.count() || !last_trim_.compare_exchange_strong(last, now)) return;
+    ::malloc_trim(0);
+  }
+
+  /// Requires the lock. A job that is done waits for the sync of its group.
   void end(std::size_t i, BatchResult result) {
     slots_.erase(i);
     --running_;
     need_ -= jobs_[i].need_bytes;
+    if (result.outcome == BatchOutcome::kDone && result.unsynced) {
+      ++unsynced_;
+      group_.emplace_back(i, std::move(result));
+    } else {
+      record_end(i, std::move(result));
+    }
+    changed_.notify_all();
+  }
+
+  /// Requires the lock.
+  void record_end(std::size_t i, BatchResult result) {
     ++ended_;
     if (result.outcome != BatchOutcome::kDone && result.outcome != BatchOutcome::kKept) ++failed_;
     const bool news = result.outcome != BatchOutcome::kStopped && (result.outcome != BatchOutcome::kKept || result.recognized);
@@ -178,7 +242,6 @@ class Queue : public std::enable_shared_from_this<Queue> {
     results_[i] = std::move(result);
     fresh_.push_back(i);
     if (options_.fail_fast && results_[i].failed()) stop_all();
-    changed_.notify_all();
   }
 
   void note(const Status& status) {
@@ -203,9 +266,11 @@ class Queue : public std::enable_shared_from_this<Queue> {
       const std::lock_guard lock(mutex_);
       note(record_.begun(job, unowned));
     }
-    BatchResult result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, unowned)});
+    const bool synced_later = syncs_in_group(job);
+    BatchResult result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, unowned), synced_later});
+    result.unsynced = synced_later;
     result.recognized = result.recognized && unowned && result.outcome == BatchOutcome::kDone;
-    if (result.outcome == BatchOutcome::kDone && !job.output.empty()) {
+    if (result.outcome == BatchOutcome::kDone && !job.output.empty() && !result.digested) {
       const Result<TreeDigest> digest = digest_tree(job.output);
       if (!digest) return failed({Fault::kOutput, digest.error().message}, std::move(result));
       result.output = *digest;
@@ -260,12 +325,16 @@ class Queue : public std::enable_shared_from_this<Queue> {
   BatchOptions options_;
   RunJob run_;
 
+  std::atomic<std::int64_t> last_trim_{0};
   std::mutex mutex_;
   std::condition_variable changed_;
   std::size_t next_ = 0;
   std::uint32_t running_ = 0, workers_ = 0, ended_ = 0, failed_ = 0;
   std::uint64_t need_ = 0;
-  bool stopped_ = false;
+  bool stopped_ = false, closed_ = false;
+  std::vector<std::pair<std::size_t, BatchResult>> group_;  // ended, with files to be synced
+  std::uint32_t unsynced_ = 0;                              // of the group, and of the one that is being synced
+  std::optional<std::uint64_t> directory_device_;
   Status record_status_;
   BatchSummary summary_;
 };

@@ -2,6 +2,7 @@
 //
 // Jobs start in list order, up to a fixed number at a time. A job starts when its expected memory fits next to the running
 // jobs, or when none is running: a job that exceeds the budget runs alone.
+// The disk works while the next jobs run: the files of jobs that ended meanwhile are synced at once, and then they are recorded.
 // A failed job is reported and the others continue. Each job is recorded as it ends (record.h), so a crash loses no
 // finished job.
 #pragma once
@@ -26,6 +27,8 @@ struct BatchOptions {
   double time_limit_seconds = 0;  // of each job; 0: none
   bool fail_fast = false;         // the first failure stops the batch
   bool resume = false, overwrite = false;
+  /// Files of finished jobs are synced in groups, before the record has their end; else each job syncs its own.
+  bool sync_in_groups = false;
 };
 
 /// A running job, for the observer.

@@ -12,9 +12,12 @@
 #include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
+#include "stages/support/hash/hash.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
+
+class JobCache;  // pipeline/cache/store.h
 
 /// Of all JSON objects that commands print; it grows when a key is removed or redefined (docs/reference/json.md).
 inline constexpr std::int64_t kJsonSchema = 1;
@@ -34,6 +37,9 @@ class Context {
   void say(std::string_view line);
   /// Reports an error after which the command continues, such as one bad operand. returns  the exit code of the error
   virtual int complain(const Error& error) = 0;
+
+  /// A cache that the caller gives its jobs; nullptr for none.
+  virtual JobCache* cache() { return nullptr; }
 
   /// How people know a file, where a call works on files that it made itself.
   virtual std::string shown(const std::string& path) { return path; }
@@ -76,6 +82,7 @@ struct Outcome {
   int code = 0;
   std::optional<Error> error;
   std::uint32_t layers_planned = 0, layers_kept = 0;  // of a job; kept: already present
+  std::optional<TreeDigest> files;                    // of all files of the output, where they are known
 };
 
 /// One command of the program.
@@ -120,6 +127,6 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
 // --- one file each in commands/, except plan.cpp (all commands that plan a job) and manual.cpp (also completion)
 extern const Command jet_command, slice_command, heights_command, extrude_command, info_command, export_command, verify_command, nest_command,
     calibrate_command, permeability_command, design_command, merge_command, stream_command, convert_command, compare_command,
-    machines_command, preview_command, report_command, batch_command, completion_command, manual_command;
+    machines_command, cache_command, preview_command, report_command, batch_command, completion_command, manual_command;
 
 }  // namespace lamina::pipeline

@@ -3,12 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <mutex>
+#include <utility>
 
+#include "pipeline/cache/store.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
+#include "pipeline/machine/profiles.h"  // is_named
 #include "stages/formats/images/layer_images.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/escape.h"
@@ -22,7 +26,8 @@ namespace {
 /// Collects a command's results and its first error; discards its messages.
 class CallContext : public Context {
  public:
-  CallContext(const ProgressCallback& progress, const std::atomic<bool>& cancel) : progress_(progress), cancel_(cancel) {}
+  CallContext(JobCache* cache, const ProgressCallback& progress, const std::atomic<bool>& cancel)
+      : cache_(cache), progress_(progress), cancel_(cancel) {}
   void say_text(std::string_view) override {}
   int complain(const Error& error) override {
     if (reason.empty()) reason = one_line(error.message);
@@ -38,6 +43,7 @@ class CallContext : public Context {
   }
   void progress(const ProgressEvent& event) override { progress_(event); }
   const std::atomic<bool>& cancel() override { return cancel_; }
+  JobCache* cache() override { return cache_; }
 
   /// The single value, an array of several, or the printed text.
   Json value() const {
@@ -48,6 +54,7 @@ class CallContext : public Context {
   std::string reason;
 
  private:
+  JobCache* const cache_;
   const ProgressCallback& progress_;
   const std::atomic<bool>& cancel_;
   std::vector<Json> values_;
@@ -60,7 +67,11 @@ Arguments with_settings(Arguments arguments, const CommandSpec& spec, const Call
     if (const OptionSpec* option = spec.find(name)) arguments.options.emplace_back(option->flag, text);
   };
   if (!settings.output.empty()) add("--output", settings.output);
-  if (!sync.empty() && !arguments.has("--sync")) add("--sync", sync);
+  if (settings.synced_later) {
+    add("--sync", "off");
+  } else if (!sync.empty() && !arguments.has("--sync")) {
+    add("--sync", sync);
+  }
   // Info takes a limit for images alone.
   const bool takes_memory = spec.name != "info" || std::ranges::any_of(arguments.operands, formats::names_images);
   if (takes_memory && !arguments.has("--memory")) add("--memory", fmt::format("{}", settings.layer_bytes));
@@ -73,14 +84,16 @@ Arguments with_settings(Arguments arguments, const CommandSpec& spec, const Call
   return arguments;
 }
 
-BatchResult run_call(const Command& command, const Arguments& arguments, const ProgressCallback& progress,
+BatchResult run_call(const Command& command, const Arguments& arguments, JobCache* cache, const ProgressCallback& progress,
                      const std::atomic<bool>& cancel) {
-  CallContext context(progress, cancel);
+  CallContext context(cache, progress, cancel);
   const Outcome outcome = run(command, arguments, context);
   BatchResult result;
   result.code = outcome.error ? context.complain(*outcome.error) : outcome.code;
   if (result.code != 0) result.reason = context.reason;
   result.value = context.value();
+  result.digested = outcome.files.has_value();
+  if (outcome.files) result.output = *outcome.files;
   result.recognized = outcome.layers_planned == 0 && outcome.layers_kept > 0;
   return result;
 }
@@ -144,6 +157,24 @@ CommandLine unpacked(const BatchJob& job) {
 
 }  // namespace
 
+Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments) {
+  const std::string folder = arguments.text("--cache");
+  if (!arguments.has("--cache")) {
+    if (arguments.has("--cache-link")) return at_option("--cache-link", "needs --cache DIR").error();
+    return std::shared_ptr<JobCache>();
+  }
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  const auto whole = [&](const std::string& path) { return fs::weakly_canonical(fs::absolute(path, ignored), ignored); };
+  const fs::path cache = whole(folder), output = whole(arguments.text("-o,--output"));
+  for (const auto& [inner, outer] : {std::pair(cache, output), std::pair(output, cache)}) {
+    if (std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end() &&
+        arguments.has("-o,--output"))
+      return at_option("--cache", folder + ": cache and output are in one another; name another folder").error();
+  }
+  return JobCache::open(folder, arguments.has("--cache-link"));
+}
+
 Result<Call> read_call(const std::vector<std::string>& words) {
   const Result<CommandLine> line = read_command_line(words);
   if (!line) return line.error();
@@ -168,6 +199,7 @@ Result<Call> read_call(const std::vector<std::string>& words) {
     call.layer_bytes = 0;
     if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
   }
+  call.names_sync = read->has("--sync") || is_named(planned, "run.sync") || spec.find("--sync") == nullptr;
   call.parsed = packed(*line);
   call.inputs = read->operands;
   for (const auto& [flag, text] : read->options) {
@@ -179,11 +211,11 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   return call;
 }
 
-RunJob job_runner(const std::string& sync) {
-  return [sync](const BatchJob& job, const CallSettings& settings, const ProgressCallback& progress,
-                const std::atomic<bool>& cancel) {
+RunJob job_runner(const std::string& sync, std::shared_ptr<JobCache> cache) {
+  return [sync, cache = std::move(cache)](const BatchJob& job, const CallSettings& settings, const ProgressCallback& progress,
+                                          const std::atomic<bool>& cancel) {
     const CommandLine line = unpacked(job);
-    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), progress, cancel);
+    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), cache.get(), progress, cancel);
   };
 }
 

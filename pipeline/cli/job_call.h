@@ -1,13 +1,20 @@
 // pipeline/cli/job_call.h: runs a command line of this program as a job, in this process.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "pipeline/batch/job.h"
+#include "pipeline/cli/terminal/arguments.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
+
+class JobCache;  // pipeline/cache/store.h
+
+/// The cache of --cache and --cache-link; none without them. errors  of JobCache::open; kUsage: --cache-link alone
+Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments);
 
 /// Reads a command line of at least one word: any command but batch and preview.
 /// errors  kUsage: no such command, wrong arguments, a job file that cannot be read
@@ -15,7 +22,8 @@ Result<Call> read_call(const std::vector<std::string>& words);
 
 /// Runs jobs whose command lines read_call() has read. The command's results and its first error are in the result; its
 /// messages are discarded.
-/// sync  when files are flushed to disk, for jobs without a setting of their own; "" for none
-RunJob job_runner(const std::string& sync);
+/// sync   when files are flushed to disk, for jobs without a setting of their own; "" for none
+/// cache  for jobs without --cache; none: no cache
+RunJob job_runner(const std::string& sync, std::shared_ptr<JobCache> cache = {});
 
 }  // namespace lamina::pipeline

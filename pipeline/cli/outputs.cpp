@@ -102,7 +102,9 @@ struct Taken {
 std::vector<Taken> taken_by(std::span<const std::string> outputs) {
   std::vector<Taken> taken;
   for (const std::string& output : outputs) {
-    if (const auto id = file_id(output)) taken.push_back({&output, *id, false});
+    const auto own = file_id(output);
+    if (!own) continue;
+    taken.push_back({&output, *own, false});
     for (const char* below : {"/layers", "/program"}) {
       if (const auto id = file_id(output + below)) taken.push_back({&output, *id, true});
     }

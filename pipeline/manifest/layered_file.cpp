@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -170,22 +169,6 @@ namespace {
 
 bool is_there(const std::string& path) { return ::access(path.c_str(), F_OK) == 0; }
 
-/// XXH3-128 of a layer's bytes, piece by piece.
-class Hasher {
- public:
-  Hasher() { XXH3_128bits_reset(state_.get()); }
-  void add(std::string_view text) { XXH3_128bits_update(state_.get(), text.data(), text.size()); }
-  /// The hash, and begins anew.
-  Hash128 take() {
-    const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
-    XXH3_128bits_reset(state_.get());
-    return {hash.high64, hash.low64};
-  }
-
- private:
-  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_{XXH3_createState(), &XXH3_freeState};
-};
-
 }  // namespace
 
 struct LayeredFile::State {
@@ -195,7 +178,7 @@ struct LayeredFile::State {
   std::vector<LayerRecord> kept;
   bool finished = false;
   std::uint64_t layer_begin = 0, size = 0;
-  Hasher hasher;
+  Hasher hasher;  // of the layer's bytes
 
   /// Adds a layer to the manifest, after its text: a kill loses neither.
   Status note(const LayerRecord& record) {

@@ -84,6 +84,10 @@ Result<OtherRuns> check_manifests(const Job& job, const Claim* claim) {
 
 }  // namespace
 
+std::string waiting_folder(const Job& job, std::string_view folder) {
+  return fmt::format("{}/{}.lamina.part", job.output, folder);
+}
+
 Result<bool> is_directory(const Job& job) {
   count(Decision::kOutput);
   std::error_code error;
@@ -160,6 +164,10 @@ Result<Claim> prepare_output(const Job& job, MadeFolders& made) {
     if (::access(position.c_str(), W_OK | X_OK) != 0) return cannot(position, errno);
   }
   remove_leftovers(job.output, [](std::string_view name) { return name.starts_with("inspection"); });
+  for (const char* folder : {"layers", "program"}) {
+    fs::remove_all(waiting_folder(job, folder), error);
+    if (error) return cannot(waiting_folder(job, folder), error.value());
+  }
   if (!job.overwrite) {
     if (!job.shard) sweep_partial_files(job.output);
     return claim;

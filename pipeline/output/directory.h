@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/job/job.h"
@@ -24,6 +25,10 @@ std::string manifest_name(const Job& job);
 /// errors  kUsage if layers of an earlier run exist without --resume or --overwrite; a shard may join the other shards
 ///         of the same split. kOutput if the directory's path is a file, or another run is writing into it
 Status check_output(const Job& job);
+
+/// Where the files of a folder of the job, layers or program, wait until all are there. A job that claims the directory removes
+/// what a killed run left in it.
+std::string waiting_folder(const Job& job, std::string_view folder);
 
 /// Whether an output directory is there. errors  kOutput if its path is a file, or it cannot be made
 Result<bool> is_directory(const Job& job);

@@ -282,7 +282,7 @@ Status check_slice_output(const Job& job) {
 }
 
 // Its name needs no random digits: the directory is claimed.
-fs::path waiting_layers(const Job& job) { return fs::path(job.output) / "layers.lamina.part"; }
+fs::path waiting_layers(const Job& job) { return waiting_folder(job, "layers"); }
 
 Status prepare_waiting_layers(const Job& job, bool keeps) {
   const fs::path waiting = waiting_layers(job);

@@ -9,6 +9,7 @@
 
 #include "pipeline/batch/queue.h"
 #include "pipeline/batch/summary.h"
+#include "pipeline/cache/store.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/job_call.h"
@@ -45,6 +46,8 @@ CommandSpec batch_spec() {
       {"--jobs", "N", "max number of concurrent jobs; 0: one per processor", "0", "Run"},
       {"--memory", "SIZE", "memory limit of all running jobs: 512M, 4G", "1G", "Run"},
       {"--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off", "job", "Run", sync->words()},
+      {"--cache", "DIR", "take the files of equal jobs from a cache, or add them", "", "Run"},
+      {"--cache-link", "", "make read-only hard links to the cache, no copies", "", "Run"},
       {"--time-limit", "SECONDS", "time limit per job in seconds; slower jobs fail with exit code 3", "", "Run"},
       {"--keep-going", "", "continue after a failed job (default)", "", "Run"},
       {"--fail-fast", "", "stop the batch at the first failed job", "", "Run"},
@@ -152,13 +155,17 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   std::vector<std::string> with;
   const Result<Durable> durable = read_sync(arguments);
   if (!durable) return durable.error();
-  const Result<BatchOptions> read = read_options(arguments, with);
+  Result<BatchOptions> read = read_options(arguments, with);
   if (!read) return read.error();
+  read->sync_in_groups = arguments.text("--sync").empty() || arguments.text("--sync") == "job";
   const BatchOptions& options = *read;
   Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
-  auto prepared =
-      prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)}, read_call);
+  const auto cache = open_cache(arguments);
+  if (!cache) return cache.error();
+  auto prepared = prepare_batch(
+      std::move(*entries),
+      {options.directory, layer_share(options.memory_bytes, options.jobs), *cache ? &(*cache)->inputs() : nullptr}, read_call);
   if (!prepared) return prepared.error();
   const auto jobs = std::make_shared<const std::vector<BatchJob>>(std::move(*prepared));
   Result<BatchRecord> record = BatchRecord::open(options.directory, options.resume, options.overwrite);
@@ -171,7 +178,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   watcher.ended = [&](const BatchJob& job, const BatchResult& result, const BatchState& state) {
     console.ended(job, result, state);
   };
-  const RunJob runner = job_runner(arguments.text("--sync"));
+  const RunJob runner = job_runner(arguments.text("--sync"), *cache);
   const Result<BatchSummary> summary = run_batch(jobs, std::move(*record), options, runner, watcher, context.cancel());
   console.clear();
   if (!summary) return summary.error();
@@ -180,6 +187,9 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   if (written) written = write_file(options.directory + "/summary.tsv", batch_table(*jobs, *summary), how);
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
+  if (*cache) {
+    for (const std::string& note : (*cache)->take_notes()) context.say("note: " + note);
+  }
   if (summary->interrupted) {
     context.complain({Fault::kInterrupted, "interrupted; finished jobs are kept; continue with the same command and --resume"});
   }

@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 
+#include "pipeline/cache/cached_run.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/job_call.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/errors.h"
@@ -72,6 +75,10 @@ CommandSpec plan_spec(const PlanCommand& row) {
   spec.options.push_back(
       {"--timing", "", rastered ? "break down the run time and compare it with the hardware limit" : "break down the run time",
        "", "Run"});
+  if (row.product != Product::kContours) {
+    spec.options.push_back({"--cache", "DIR", "take the files of an equal job from a cache, or add them", "", "Run"});
+    spec.options.push_back({"--cache-link", "", "make read-only hard links to the cache, no copies", "", "Run"});
+  }
   spec.options.push_back({"--json", "", "print the result as one JSON object on stdout", "", "Run"});
   spec.options.push_back({"--quiet", "", "print errors only", "", "Run"});
   spec.more = row.closing;
@@ -90,6 +97,14 @@ std::vector<std::string> notes_on_defaults(const std::string& path, const Job& j
     notes.push_back(fmt::format("{} names no layers.thickness_mm: layers are {:g} mm, by the printer", file, job.layer_mm));
   }
   return notes;
+}
+
+/// cache  nullptr: the job runs. errors  those of run()
+Result<CachedRun> run_or_take(JobCache* cache, Resolved resolved, const ProgressCallback& progress,
+                              const std::atomic<bool>& cancel) {
+  if (cache != nullptr) return run_with_cache(*cache, std::move(resolved), progress, cancel);
+  Result<Summary> summary = run(std::move(resolved), progress, cancel);
+  return summary ? CachedRun{std::move(*summary), {}} : Result<CachedRun>(summary.error());
 }
 
 Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& context) {
@@ -143,8 +158,15 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (event.stage == ProgressEvent::Stage::kLayers) keep_job();
     context.progress(event);
   };
-  Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());
-  if (!summary) return summary.error();
+  const auto own_cache = open_cache(arguments);
+  if (!own_cache) return own_cache.error();
+  JobCache* const cache = *own_cache ? own_cache->get() : context.cache();
+  Result<CachedRun> finished = run_or_take(cache, std::move(*resolved), progress, context.cancel());
+  if (!finished) return finished.error();
+  Summary* const summary = &finished->summary;
+  if (*own_cache && !job->quiet) {
+    for (const std::string& note : (*own_cache)->take_notes()) context.say("note: " + note);
+  }
   keep_job();
   if (!kept) return kept.error();
   if (reports_pores) add_pores(summary->output, *summary);
@@ -159,6 +181,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   Outcome outcome;
   outcome.layers_planned = summary->layers_planned;
   outcome.layers_kept = summary->layers_kept;
+  outcome.files = finished->files;
   return outcome;
 }
 

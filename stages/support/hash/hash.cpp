@@ -9,9 +9,11 @@
 #include <charconv>
 #include <cstring>
 #include <filesystem>
-#include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
+#include "stages/support/hash/tree.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina {
@@ -35,30 +37,45 @@ bool read_hex(std::string_view text, Hash128& hash) {
   return half(0, hash.high) && half(16, hash.low);
 }
 
+Hasher::Hasher() : state_(XXH3_createState()) {
+  if (state_ == nullptr) throw std::bad_alloc();
+  XXH3_128bits_reset(static_cast<XXH3_state_t*>(state_));
+}
+
+Hasher::~Hasher() { XXH3_freeState(static_cast<XXH3_state_t*>(state_)); }
+
+void Hasher::add(std::span<const std::byte> bytes) {
+  XXH3_128bits_update(static_cast<XXH3_state_t*>(state_), bytes.data(), bytes.size());
+}
+
+Hash128 Hasher::take() {
+  const XXH128_hash_t hash = XXH3_128bits_digest(static_cast<const XXH3_state_t*>(state_));
+  XXH3_128bits_reset(static_cast<XXH3_state_t*>(state_));
+  return {hash.high64, hash.low64};
+}
+
 Result<FileDigest> digest_file(const std::string& path, std::optional<std::uint64_t> expected) {
   auto file = FileReader::open(path, {.missing = std::strerror(ENOENT)});
   if (!file) return file.error();
   if (expected && file->size() != *expected) return FileDigest{file->size(), {}};
-  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);
-  XXH3_128bits_reset(state.get());
-  std::vector<char> piece(256 << 10);
+  Hasher hasher;
+  // As small as the file: a batch has many small ones.
+  std::vector<char> piece(static_cast<std::size_t>(std::min<std::uint64_t>(file->size() + 1, 256 << 10)));
   FileDigest digest;
   while (true) {
     const ssize_t got = ::read(file->descriptor(), piece.data(), piece.size());
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return Error{Fault::kVerification, fmt::format("{}: {}", path, std::strerror(errno))};
-    if (got == 0) break;
     digest.bytes += static_cast<std::uint64_t>(got);
-    XXH3_128bits_update(state.get(), piece.data(), static_cast<std::size_t>(got));
+    hasher.add(std::as_bytes(std::span(piece).first(static_cast<std::size_t>(got))));
+    if (static_cast<std::size_t>(got) < piece.size()) break;  // of a regular file: its end
   }
-  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
-  digest.hash = {hash.high64, hash.low64};
+  digest.hash = hasher.take();
   return digest;
 }
 
 Result<TreeDigest> digest_tree(const std::string& path) {
   namespace fs = std::filesystem;
-  TreeDigest digest;
   std::vector<fs::path> files;
   std::error_code error;
   if (fs::is_regular_file(path, error)) files.emplace_back(path);
@@ -69,32 +86,26 @@ Result<TreeDigest> digest_tree(const std::string& path) {
     }
     if (error) return Error{Fault::kVerification, fmt::format("{}: {}", path, error.message())};
   }
-  std::ranges::sort(files);
-  std::string text;
+  std::vector<std::pair<std::string, FileDigest>> digests;
   for (const fs::path& file : files) {
     const Result<FileDigest> one = digest_file(file.string());
     if (!one) return one.error();
-    text += fmt::format("{} {} {}\n", file.lexically_relative(path).string(), one->bytes, hex(one->hash));
-    digest.bytes += one->bytes;
+    digests.emplace_back(file.lexically_relative(path).string(), *one);
   }
-  digest.files = files.size();
-  digest.hash = hash_text(text);
-  return digest;
+  return digest_of(std::move(digests));
 }
 
 std::optional<Hash128> digest_range(const FileReader& file, std::uint64_t offset, std::uint64_t bytes) {
-  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);
-  XXH3_128bits_reset(state.get());
+  Hasher hasher;
   std::vector<char> piece(static_cast<std::size_t>(std::min<std::uint64_t>(bytes, 256 << 10)));
   while (bytes > 0) {
     const std::span<char> part = std::span(piece).first(static_cast<std::size_t>(std::min<std::uint64_t>(bytes, piece.size())));
     if (!file.read_at(offset, part)) return std::nullopt;
-    XXH3_128bits_update(state.get(), part.data(), part.size());
+    hasher.add(std::as_bytes(part));
     offset += part.size();
     bytes -= part.size();
   }
-  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
-  return Hash128{hash.high64, hash.low64};
+  return hasher.take();
 }
 
 }  // namespace lamina

@@ -27,6 +27,22 @@ std::string hex(const Hash128& hash);
 /// errors  false if the text is not 32 hexadecimal digits
 bool read_hex(std::string_view text, Hash128& hash);
 
+/// XXH3-128 of bytes that come in pieces.
+class Hasher {
+ public:
+  Hasher();
+  ~Hasher();
+  Hasher(const Hasher&) = delete;
+  Hasher& operator=(const Hasher&) = delete;
+  void add(std::span<const std::byte> bytes);
+  void add(std::string_view text) { add(std::as_bytes(std::span(text))); }
+  /// Of all bytes since the last call.
+  Hash128 take();
+
+ private:
+  void* state_;
+};
+
 struct FileDigest {
   std::uint64_t bytes = 0;
   Hash128 hash;
