@@ -160,7 +160,7 @@ CommandLine unpacked(const BatchJob& job) {
 Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments) {
   const std::string folder = arguments.text("--cache");
   if (!arguments.has("--cache")) {
-    if (arguments.has("--cache-link")) return at_option("--cache-link", "needs --cache DIR").error();
+    if (arguments.has("--cache-link")) return at_option("--cache-link", "needs --cache FOLDER").error();
     return std::shared_ptr<JobCache>();
   }
   namespace fs = std::filesystem;

@@ -19,7 +19,7 @@ CommandSpec cache_spec() {
   spec.summary =
       "Prints the size of a cache of finished jobs (--cache of jet, extrude and batch), how often it was used, and the age of\n"
       "its entries. Trims it, or finds damaged files. Processes that use the cache at the same time are not disturbed.";
-  spec.operand = "DIR";
+  spec.operand = "FOLDER";
   spec.operand_meaning = "the folder of the cache";
   spec.options = {{"--max-size", "SIZE", "remove the entries used longest ago beyond it: 500M, 50G", "", ""},
                   {"--verify", "", "read all files; remove damaged ones (exit code 5)", "", ""},

@@ -76,7 +76,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
       {"--timing", "", rastered ? "break down the run time and compare it with the hardware limit" : "break down the run time",
        "", "Run"});
   if (row.product != Product::kContours) {
-    spec.options.push_back({"--cache", "DIR", "take the files of an equal job from a cache, or add them", "", "Run"});
+    spec.options.push_back({"--cache", "FOLDER", "take the files of an equal job from a cache, or add them", "", "Run"});
     spec.options.push_back({"--cache-link", "", "make read-only hard links to the cache, no copies", "", "Run"});
   }
   spec.options.push_back({"--json", "", "print the result as one JSON object on stdout", "", "Run"});
