@@ -104,6 +104,26 @@ TEST_F(Durability, TheDiskBeginsWithALargeFileWhileItGrows) {
   EXPECT_EQ(count(calls(line + "off --sync off"), "begin"), 0u);
 }
 
+TEST_F(Durability, ABatchSyncsTheFilesOfItsJobsTogetherBeforeItRecordsThem) {
+  write_text(directory_ / "list.txt", "jet part.stl --layer 0.5 --dpi 60 -o a\njet part.stl --layer 1 --dpi 60 -o b\n");
+  const Lines lines = calls("batch list.txt --quiet -o out");
+  const auto named = std::find(lines.rbegin(), lines.rend(), "rename out/b/manifest.json.part out/b/manifest.json");
+  const auto synced = std::find(lines.rbegin(), lines.rend(), "syncfs out");
+  ASSERT_NE(named, lines.rend());
+  EXPECT_LT(synced - lines.rbegin(), named - lines.rbegin());
+  EXPECT_EQ(count(lines, "fsync out/a") + count(lines, "syncfs out/a"), 0u);
+  ::setenv("LAMINA_FAIL_SYNC", "failing", 1);
+  EXPECT_EQ(run("batch list.txt --quiet -o failing").code, 4);
+  const std::string record = read_text(directory_ / "failing/batch.jsonl");
+  EXPECT_NE(record.find("failed"), std::string::npos);
+  EXPECT_EQ(record.find("\"done\""), std::string::npos);
+  // A job that says itself when it syncs is left alone.
+  ::unsetenv("LAMINA_FAIL_SYNC");
+  write_text(directory_ / "list.txt", "jet part.stl --layer 0.5 --dpi 60 -o a --sync job\n");
+  EXPECT_GE(count(calls("batch list.txt --quiet -o own"), "syncfs own/a/layers"), 1u);
+  EXPECT_GE(count(calls("batch list.txt --quiet -o off --sync off"), "syncfs off/a"), 1u);
+}
+
 TEST_F(Durability, OffSyncsNothingAndGivesTheSameBytes) {
   for (const std::string line :
        {"jet part.stl --layer 0.5 --machine hp45 --quiet -o ", "slice part.stl --layer 0.5 --quiet -o ",
