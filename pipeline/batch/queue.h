@@ -21,11 +21,14 @@ namespace lamina::pipeline {
 
 struct BatchOptions {
   std::string directory;
+  std::uint32_t share = 0, shares = 0;  // of BatchFiles
   std::uint32_t jobs = 1;  // running at a time
   std::uint64_t memory_bytes = 1ull << 30;
   double time_limit_seconds = 0;  // of each job; 0: none
   bool fail_fast = false;         // the first failure stops the batch
   bool resume = false, overwrite = false;
+
+  BatchFiles files() const { return {directory, share, shares}; }
 };
 
 /// A running job, for the observer.
