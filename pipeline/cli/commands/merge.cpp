@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "pipeline/batch/shares.h"
 #include "pipeline/batch/whole.h"
 #include "pipeline/check/job_files.h"
 #include "pipeline/cli/command.h"
@@ -53,9 +54,9 @@ Outcome merge_batch(const Arguments& arguments, Context& context) {
   complain_of(missing, directory, context);
   if (!missing.ok()) return static_cast<int>(Fault::kVerification);
   keep_on_signals();
-  if (batch->shares > 0) {
-    if (Status status = merge_shares(*batch, kJsonSchema, {.follow = false}, context.cancel()); !status) return status;
-  }
+  const Status merged = batch->shares > 0 ? merge_shares(*batch, kJsonSchema, {.follow = false}, context.cancel())
+                                          : remove_shares(directory);  // that an interrupted merge left
+  if (!merged) return merged;
   if (!arguments.has("--quiet")) {
     context.say(batch->shares > 0 ? fmt::format("{}: {} jobs of {} shares joined", directory, batch->jobs.size(), batch->shares)
                                   : fmt::format("{}: is whole already, {} jobs", directory, batch->jobs.size()));
