@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -36,9 +37,9 @@ std::vector<std::string> without_output(const std::vector<std::string>& words) {
   return kept;
 }
 
-/// Seconds of a job on one processor, from the summary of its dry run: a sum of what start, triangles, layers, and pixels or
-/// area take. The factors were fitted to jobs of shared/models within a factor of 3 (bench/shares.md); shares need their ratios
-/// only.
+/// Seconds of the layers of a job on one processor, from the summary of its dry run: a sum of what layers, and pixels or area
+/// take. The factors were fitted to jobs of shared/models within a factor of 3 (bench/shares.md); shares need their ratios
+/// only. 0: the summary is not that of a job with parts
 double estimate_seconds(const Json& summary) try {
   const auto number = [&](std::string_view name) {
     const Json* member = summary.find(name);
@@ -52,9 +53,9 @@ double estimate_seconds(const Json& summary) try {
     const auto side_mm = [&](std::size_t axis) { return hi.at(axis).get<double>() - lo.at(axis).get<double>(); };
     area_mm2 += part.at("copies").get<double>() * side_mm(0) * side_mm(1);
   }
-  if (command == "jet") return 0.005 + 5e-7 * triangles + layers * (3e-5 + 2e-11 * pixels);
-  if (command == "slice") return 0.005 + 5e-7 * triangles + layers * 3e-6 * std::sqrt(triangles);
-  return 0.005 + 1e-6 * triangles + layers * (1e-4 + 5e-6 * std::sqrt(triangles) + 3.5e-7 * area_mm2);
+  if (command == "jet") return layers * (3e-5 + 2e-11 * pixels);
+  if (command == "slice") return layers * 3e-6 * std::sqrt(triangles);
+  return layers * (1e-4 + 5e-6 * std::sqrt(triangles) + 6e-7 * area_mm2);
 } catch (const JsonError&) {
   return 0;
 }
@@ -82,10 +83,12 @@ class DryRuns {
     dry.parsed = call->parsed;
     CallSettings settings;
     settings.layer_bytes = job.layer_bytes;
-    const BatchResult result = run_(
-        dry, settings, [](const ProgressEvent&) {}, cancel_);
-    const double seconds = result.code == 0 ? estimate_seconds(result.value) : 0;
-    if (seconds > 0) known->second = microseconds(seconds);
+    // A dry run takes as long as loading; a job that fails in it ends then.
+    const auto start = std::chrono::steady_clock::now();
+    const ProgressCallback ignored = [](const ProgressEvent&) {};
+    const BatchResult result = run_(dry, settings, ignored, cancel_);
+    const double load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    known->second = microseconds(load_seconds + (result.code == 0 ? estimate_seconds(result.value) : 0));
     return known->second;
   }
 
