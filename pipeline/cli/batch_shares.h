@@ -27,9 +27,9 @@ Result<std::vector<BatchJob>> prepare_share(std::vector<BatchEntry> entries, con
                                             const BatchOptions& options, const std::vector<std::string>& with);
 
 /// Writes the plan of the shares and runs no job. Costs are microseconds, estimated from a dry run of each job with layers, and
-/// from the files of other jobs; equal jobs are run once. A plan of the same list that exists is kept, unless it is overwritten.
-/// progress  number of jobs with a cost
-/// errors  as prepare_share(); kInterrupted: `cancel` is set, and nothing is written
+/// from the files of other jobs; equal jobs are run once. A plan of the same list that exists is kept, unless it is
+/// overwritten. progress  number of jobs with a cost errors  as prepare_share(); kInterrupted: `cancel` is set, and nothing is
+/// written
 Result<SharePlan> plan_by_dry_runs(std::vector<BatchEntry> entries, const BatchShare& share, const BatchOptions& options,
                                    const std::vector<std::string>& with, const std::function<void(std::size_t)>& progress,
                                    const std::atomic<bool>& cancel);
