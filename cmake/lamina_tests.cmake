@@ -152,7 +152,13 @@ add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
          COMMAND ${PROJECT_SOURCE_DIR}/tests/cluster/slurm $<TARGET_FILE:lamina>)
-set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)
+add_test(NAME Cluster.AListInSharesOnSlurmIsOneBatchThoughAWorkerIsKilled
+         COMMAND ${PROJECT_SOURCE_DIR}/tests/cluster/slurm_batch $<TARGET_FILE:lamina>)
+add_test(NAME Cluster.CommandsOfTheKubernetesFileAreOneBatch
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/cluster/kubernetes_batch $<TARGET_FILE:lamina>)
+add_test(NAME Cluster.TheDaskBlockOfTheGuideIsOneBatch COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/cluster/dask_batch $<TARGET_FILE:lamina>)
+set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled Cluster.AListInSharesOnSlurmIsOneBatchThoughAWorkerIsKilled
+                     Cluster.CommandsOfTheKubernetesFileAreOneBatch Cluster.TheDaskBlockOfTheGuideIsOneBatch PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)
 # The longest begin first, so that no core waits for the last of them.
 set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart Documentation.EveryExampleOfEveryCommandRuns
                      Documentation.EveryCommandOfTheGuidesPrintsWhatTheySay Golden.EveryJobWritesTheBytesOfTheTable PROPERTIES COST 100)

@@ -14,6 +14,7 @@
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/escape.h"
+#include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/version.h"
 
@@ -110,7 +111,8 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
 constexpr std::uint64_t kMebibyte = 1ull << 20;
 
 /// The batch's own files in its directory; .part while being written.
-constexpr std::array kOwnFiles = {"batch.jsonl", "summary.json", "summary.json.part", "summary.tsv", "summary.tsv.part"};
+constexpr std::array kOwnFiles = {"batch.jsonl",      "summary.json", "summary.json.part", "summary.tsv",
+                                  "summary.tsv.part", "shares.tsv",   "shares.tsv.part"};
 
 /// A path relative to the batch's directory; empty if it is not below.
 fs::path below_batch(const fs::path& path, const std::string& directory) {
@@ -118,18 +120,47 @@ fs::path below_batch(const fs::path& path, const std::string& directory) {
   return below.empty() || *below.begin() == ".." ? fs::path() : below;
 }
 
+/// Hashes the input files of jobs. Many jobs read the same file: it is read once.
+class JobIdentities {
+ public:
+  explicit JobIdentities(InputDigests* inputs) : inputs_(inputs) {}
+
+  /// Sets the job's id and adds the memory for its input files.
+  void identify(const std::vector<std::string>& words, const std::vector<std::string>& inputs, BatchJob& job) {
+    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.position());
+    for (const std::string& word : words) identity += fmt::format("{}:{}\n", word.size(), word);
+    for (const std::string& input : std::set<std::string>(inputs.begin(), inputs.end())) {
+      const auto [known, fresh] = digests_.try_emplace(hash_text(input));
+      if (fresh && is_file(input)) {
+        const Result<FileDigest> read = inputs_ != nullptr ? inputs_->of(input) : digest_file(input);
+        if (read) known->second = *read;
+      }
+      const std::optional<FileDigest>& digest = known->second;
+      if (!digest) continue;
+      identity += fmt::format("{} {} {}\n", input, digest->bytes, hex(digest->hash));
+      job.need_bytes += load::part_bytes(input, digest->bytes);
+    }
+    job.id = hash_text(identity);
+  }
+
+ private:
+  InputDigests* const inputs_;
+  std::map<Hash128, std::optional<FileDigest>, HashOrder> digests_;  // by the names of the files
+};
+
 /// Resolves entries in order; an error of a single job becomes job.refused.
 class Preparation {
  public:
-  explicit Preparation(const BatchShare& share) : share_(share) {
+  explicit Preparation(const BatchShare& share) : share_(share), identities_(share.inputs) {
     for (const char* name : kOwnFiles) names_.insert(hash_text(name));
   }
 
-  void prepare(BatchJob& job, const ReadCall& read) {
+  void prepare(BatchJob& job, const ReadCall& read, const InspectCall& inspect) {
     const std::vector<std::string> words = job.entry.words.unpacked();
     Result<Call> call = read(words);
     if (!call) {
       job.refused = call.error();
+      if (inspect) inspect(job, {});
       return;
     }
     job.can_continue = call->can_continue;
@@ -142,7 +173,7 @@ class Preparation {
       job.layer_bytes = *call->layer_bytes > 0 ? *call->layer_bytes : share_.layer_bytes;
       job.need_bytes += job.layer_bytes;
     }
-    digest_inputs(words, call->inputs, job);
+    inspect ? inspect(job, *call) : identities_.identify(words, call->inputs, job);
   }
 
  private:
@@ -168,31 +199,10 @@ class Preparation {
     if (!below.empty() && job.output.ends_with(below)) job.below = static_cast<std::uint32_t>(job.output.size() - below.size());
   }
 
-  void digest_inputs(const std::vector<std::string>& words, const std::vector<std::string>& inputs, BatchJob& job) {
-    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.position());
-    for (const std::string& word : words) identity += fmt::format("{}:{}\n", word.size(), word);
-    for (const std::string& input : std::set<std::string>(inputs.begin(), inputs.end())) {
-      const auto [known, fresh] = digests_.try_emplace(hash_text(input));
-      if (fresh && is_file(input)) {
-        const Result<FileDigest> read = share_.inputs != nullptr ? share_.inputs->of(input) : digest_file(input);
-        if (read) known->second = *read;
-      }
-      const std::optional<FileDigest>& digest = known->second;
-      if (!digest) continue;
-      identity += fmt::format("{} {} {}\n", input, digest->bytes, hex(digest->hash));
-      job.need_bytes += load::part_bytes(input, digest->bytes);
-    }
-    job.id = hash_text(identity);
-  }
-
   const BatchShare& share_;
-  std::map<Hash128, std::optional<FileDigest>, HashOrder> digests_;  // of files by their names: many jobs read the same
-  std::set<Hash128, HashOrder> names_;                               // of outputs named after their jobs, and own files
+  JobIdentities identities_;
+  std::set<Hash128, HashOrder> names_;  // of outputs named after their jobs, and own files
 };
-
-bool lies_within(const fs::path& inner, const fs::path& outer) {
-  return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
-}
 
 /// A path as text that is sorted by the parts of paths: what separates them comes before all else.
 std::string sortable(const fs::path& path) {
@@ -221,10 +231,10 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
       return refused(
           fmt::format("writes into {} itself, which belongs to the batch; give it a name below it with -o", directory));
     }
-    for (const char* name : kOwnFiles) {
-      if (!lies_within(path, own / name)) continue;
+    const fs::path below = below_batch(path, own.string());
+    if (!below.empty() && is_batch_file(below.begin()->string())) {
       return refused(fmt::format("writes into {}, which belongs to the batch; give it another name with -o",
-                                 (fs::path(directory) / name).string()));
+                                 (fs::path(directory) / *below.begin()).string()));
     }
     outputs.emplace_back(sortable(path), &job);
   }
@@ -251,9 +261,18 @@ void BatchResult::take_warnings() {
   if (text != nullptr) first_warning = text->text();
 }
 
-std::string_view outcome_name(BatchOutcome outcome) {
-  constexpr std::string_view kNames[] = {"done", "kept", "failed", "time limit", "stopped", "not run"};
-  return kNames[static_cast<std::size_t>(outcome)];
+namespace {
+
+constexpr std::string_view kOutcomes[] = {"done", "kept", "failed", "time limit", "stopped", "not run"};
+
+}  // namespace
+
+std::string_view outcome_name(BatchOutcome outcome) { return kOutcomes[static_cast<std::size_t>(outcome)]; }
+
+std::optional<BatchOutcome> outcome_of(std::string_view name) {
+  const auto found = std::ranges::find(kOutcomes, name);
+  if (found == std::end(kOutcomes)) return {};
+  return static_cast<BatchOutcome>(found - std::begin(kOutcomes));
 }
 
 Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with) {
@@ -274,7 +293,23 @@ Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& opera
   return entries;
 }
 
-Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read) {
+bool is_batch_file(std::string_view name) {
+  if (std::ranges::find(kOwnFiles, name) != kOwnFiles.end()) return true;
+  if (name.ends_with(".part")) name.remove_suffix(5);
+  for (const auto& [before, after] :
+       {std::pair<std::string_view, std::string_view>{"batch-", ".jsonl"}, {"summary-", ".json"}, {"summary-", ".tsv"}}) {
+    if (!name.starts_with(before) || !name.ends_with(after) || name.size() < before.size() + after.size()) continue;
+    const std::string_view share = name.substr(before.size(), name.size() - before.size() - after.size());
+    const std::size_t of = share.find("-of-");
+    std::array<std::uint32_t, 2> ignored{};
+    if (of == std::string_view::npos) continue;
+    if (read_shard(fmt::format("{}/{}", share.substr(0, of), share.substr(of + 4)), ignored).empty()) return true;
+  }
+  return false;
+}
+
+Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read,
+                                            const InspectCall& inspect) {
   Preparation preparation(share);
   std::vector<BatchJob> jobs;
   jobs.reserve(entries.size());
@@ -282,10 +317,20 @@ Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, con
     BatchJob& job = jobs.emplace_back();
     job.number = static_cast<std::uint32_t>(jobs.size());
     job.entry = std::move(entry);
-    preparation.prepare(job, read);
+    preparation.prepare(job, read, inspect);
   }
   if (Status status = check_apart(jobs, share.directory); !status) return status.error();
   return jobs;
+}
+
+void identify_jobs(std::vector<BatchJob>& jobs, const BatchShare& share, const ReadCall& read) {
+  JobIdentities identities(share.inputs);
+  for (BatchJob& job : jobs) {
+    if (job.refused) continue;
+    const std::vector<std::string> words = job.entry.words.unpacked();
+    const Result<Call> call = read(words);
+    identities.identify(words, call ? call->inputs : std::vector<std::string>(), job);
+  }
 }
 
 }  // namespace lamina::pipeline

@@ -74,6 +74,8 @@ enum class BatchOutcome {
 };
 
 std::string_view outcome_name(BatchOutcome outcome);
+/// Of a name; nothing if no outcome has it.
+std::optional<BatchOutcome> outcome_of(std::string_view name);
 
 /// For sets and maps of names, which take less as hashes.
 struct HashOrder {
@@ -116,6 +118,7 @@ struct Call {
   std::optional<std::uint64_t> layer_bytes;        // its layer budget; 0 if it accepts one and sets none
   bool names_sync = false;                         // when its files are synced is stated by the words or the job file
   std::vector<std::string> inputs;                 // words of the command line that may be input files
+  double layer_mm = 0;                             // layer thickness of a job with layers, else 0
   PackedWords parsed;                              // for RunJob
 };
 
@@ -151,10 +154,21 @@ struct BatchShare {
   InputDigests* inputs = nullptr;  // known hashes of files, which outlive the call; nullptr: own ones
 };
 
+/// Receives each job with its call, an empty one if the job is refused.
+using InspectCall = std::function<void(const BatchJob&, const Call&)>;
+
 /// Prepares the jobs in the order of the entries. Writes nothing. Some hundred bytes a job stay.
+/// inspect  if set, no input file is read: identify_jobs() completes the jobs that will run
 /// errors  kUsage: outputs of two jobs coincide or nest (both are named); an output collides with the batch's own files;
 ///         a relative output leaves the batch's directory
 /// cost    reads every input file once, to detect later changes
-Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read);
+Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read,
+                                            const InspectCall& inspect = {});
+
+/// Sets id and expected memory from the input files. cost  reads every input file of these jobs once
+void identify_jobs(std::vector<BatchJob>& jobs, const BatchShare& share, const ReadCall& read);
+
+/// Whether a batch keeps a file of this name in its directory: batch.jsonl, batch-2-of-4.jsonl, summary.json, shares.tsv.
+bool is_batch_file(std::string_view name);
 
 }  // namespace lamina::pipeline

@@ -22,6 +22,7 @@ namespace lamina::pipeline {
 
 struct BatchOptions {
   std::string directory;
+  std::uint32_t share = 0, shares = 0;  // of BatchFiles
   std::uint32_t jobs = 1;  // running at a time
   std::uint64_t memory_bytes = 1ull << 30;
   double time_limit_seconds = 0;  // of each job; 0: none
@@ -29,6 +30,8 @@ struct BatchOptions {
   bool resume = false, overwrite = false;
   /// Files of finished jobs are synced in groups, before the record has their end; else each job syncs its own.
   bool sync_in_groups = false;
+
+  BatchFiles files() const { return {directory, share, shares}; }
 };
 
 /// A running job, for the observer.

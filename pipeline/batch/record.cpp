@@ -13,8 +13,6 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::string_view kName = "batch.jsonl";
-
 Hash128 key_of(const BatchJob& job) { return hash_text(job.output.empty() ? hex(job.id) : job.position()); }
 
 /// Reads one line of the file; nothing if it is incomplete.
@@ -43,7 +41,55 @@ void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, Batc
   return;
 }
 
+void read_entry(const std::string& line, std::uint64_t at, RecordedBatch& batch) try {
+  if (!json_nests_within(line)) return;
+  const Json json = parse_json(line);
+  if (const Json* count = json.find("jobs")) {
+    batch.planned = count->get<std::size_t>();
+    return;
+  }
+  const RecordedLine position{at, static_cast<std::uint32_t>(line.size())};
+  const bool ended = json.contains("ended");
+  RecordedJob entry;
+  entry.job.number = json.at("job").get<std::uint32_t>();
+  entry.job.output = json.at("output").text();
+  if (!read_hex(json.at(ended ? "ended" : "begun").text(), entry.job.id)) return;
+  const std::string& output = entry.job.output;
+  RecordedJob& known = batch.jobs[hash_text(output.empty() ? fmt::format("\n{}", entry.job.number) : output)];
+  if (!ended) {
+    entry.begun = position;
+    known = std::move(entry);
+    return;
+  }
+  BatchResult& result = entry.result;
+  const std::optional<BatchOutcome> outcome = outcome_of(json.at("outcome").text());
+  if (!outcome || !read_hex(json.at("hash").text(), result.output.hash)) return;
+  result.outcome = *outcome;
+  json.at("code").get_to(result.code);
+  json.at("reason").get_to(result.reason);
+  json.at("seconds").get_to(result.seconds);
+  json.at("files").get_to(result.output.files);
+  json.at("bytes").get_to(result.output.bytes);
+  result.value = json.at("result");
+  result.take_warnings();
+  result.value = {};
+  result.line = position;
+  entry.job.entry.source = json.at("source").text();
+  entry.job.entry.words = json.at("words").get<std::vector<std::string>>();
+  if (known.job.id == entry.job.id) entry.begun = known.begun;
+  entry.ended = true;
+  if (const Json* elsewhere = json.find("elsewhere")) entry.elsewhere = elsewhere->get<bool>();
+  known = std::move(entry);
+} catch (const JsonError&) {
+  return;
+}
+
 }  // namespace
+
+std::string BatchFiles::path(std::string_view name, std::string_view ending) const {
+  const std::string share_name = shares == 0 ? std::string() : fmt::format("-{}-of-{}", share, shares);
+  return (std::filesystem::path(directory) / fmt::format("{}{}{}", name, share_name, ending)).string();
+}
 
 Json result_json(const BatchJob& job, const BatchResult& result, const Json& value) {
   return {{"job", job.number},
@@ -60,20 +106,22 @@ Json result_json(const BatchJob& job, const BatchResult& result, const Json& val
           {"result", value}};
 }
 
-Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume, bool overwrite) {
+Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool overwrite) {
   namespace fs = std::filesystem;
   std::error_code error;
-  fs::create_directories(directory, error);
-  if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
-  const std::string path = (fs::path(directory) / kName).string();
-  auto journal = Journal::open(path, "another batch is running here right now; wait for it or name another directory");
+  fs::create_directories(files.directory, error);
+  if (error) return failure(Fault::kOutput, "{}: {}", files.directory, error.message());
+  const std::string path = files.record();
+  auto journal =
+      Journal::open(path, files.shares > 0 ? "this share is running right now in another process; wait for it"
+                                           : "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
   if (!journal->empty() && !resume && !overwrite) {
     return usage(
         "{}: belongs to an earlier batch; continue it with --resume, replace it with --overwrite, or name another directory",
         path);
   }
-  BatchRecord record(directory, std::move(*journal));
+  BatchRecord record(files, std::move(*journal));
   if (resume) {
     const Status status =
         record.journal_.read([&](const std::string& line, std::uint64_t at) { read_line(line, at, record.earlier_); });
@@ -94,6 +142,8 @@ Status BatchRecord::append(const std::string& line) {
   return status ? status : Error{status.error().fault, status.error().message + ", and continue with --resume"};
 }
 
+Status BatchRecord::planned(std::size_t jobs) { return append(json_line({{"jobs", jobs}})); }
+
 Status BatchRecord::begun(const BatchJob& job, bool unowned) {
   Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.position()}};
   if (unowned) entry["unowned"] = true;
@@ -103,6 +153,8 @@ Status BatchRecord::begun(const BatchJob& job, bool unowned) {
 Status BatchRecord::ended(const BatchJob& job, BatchResult& result) {
   Json entry = {{"ended", hex(job.id)}};
   entry.update(result_json(job, result, result.value));
+  // Of a job file: relative to the working directory, not to the batch's.
+  if (job.below == 0 && !job.output.empty() && !job.output.starts_with('/')) entry["elsewhere"] = true;
   const std::string text = json_line(entry);
   if (Status status = append(text); !status) return status;
   result.line = {journal_.end() - text.size(), static_cast<std::uint32_t>(text.size() - 1)};
@@ -110,24 +162,27 @@ Status BatchRecord::ended(const BatchJob& job, BatchResult& result) {
   return {};
 }
 
-RecordedValues::RecordedValues(const std::string& directory) : path_((std::filesystem::path(directory) / kName).string()) {}
-
-Result<Json> RecordedValues::at(const RecordedLine& line) try {
+Result<std::string> RecordedValues::line_at(const RecordedLine& line) {
   if (!file_) {
     auto opened = FileReader::open(path_, {.fault = Fault::kOutput, .any_bytes = true});
     if (!opened) return opened.error();
     file_.emplace(std::move(*opened));
   }
   std::string text(line.bytes, '\0');
-  if (!file_->read_at(line.at, text) || !json_nests_within(text))
+  if (!file_->read_at(line.at, text))
     return failure(Fault::kOutput, "{}: was changed by something else while the batch ran", path_);
-  return parse_json(text).at("result");
+  return text;
+}
+
+Result<Json> RecordedValues::value_in(const std::string& line) const try {
+  if (!json_nests_within(line)) throw JsonError("nests too deeply");
+  return parse_json(line).at("result");
 } catch (const JsonError&) {
   return failure(Fault::kOutput, "{}: was changed by something else while the batch ran", path_);
 }
 
 Result<BatchResult> BatchRecord::kept(const Earlier& earlier) const {
-  Result<Json> value = RecordedValues(directory_).at(earlier.line);
+  Result<Json> value = RecordedValues(files_).at(earlier.line);
   if (!value) return value.error();
   BatchResult found;
   found.outcome = BatchOutcome::kKept;
@@ -138,6 +193,13 @@ Result<BatchResult> BatchRecord::kept(const Earlier& earlier) const {
   found.value = {};
   found.line = earlier.line;
   return found;
+}
+
+Result<RecordedBatch> read_record(const BatchFiles& files) {
+  RecordedBatch batch;
+  Status status = read_journal(files.record(), [&](const std::string& line, std::uint64_t at) { read_entry(line, at, batch); });
+  if (!status) return status.error();
+  return batch;
 }
 
 }  // namespace lamina::pipeline

@@ -1,7 +1,8 @@
 // pipeline/batch/record.h: the progress of a batch, in a file that survives a kill at any moment.
 //
-// batch.jsonl is a journal of JSON objects (stages/support/io/journal.h): {"begun":ID,...} when a job starts, {"ended":ID,...}
-// with its result when it ends. A line torn by a kill or a full disk is skipped, and its job runs again.
+// batch.jsonl is a journal of JSON objects (stages/support/io/journal.h): {"jobs":N} when a batch starts, {"begun":ID,...} when
+// a job starts, {"ended":ID,...} with its result when it ends. A line torn by a kill or a full disk is skipped, and its job
+// runs again.
 #pragma once
 
 #include <map>
@@ -16,6 +17,22 @@
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
+
+/// The files of a batch, or of one share of it, in the directory of the batch.
+struct BatchFiles {
+  BatchFiles(std::string of, std::uint32_t number = 0, std::uint32_t count = 0)
+      : directory(std::move(of)), share(number), shares(count) {}
+
+  std::string record() const { return path("batch", ".jsonl"); }  // DIR/batch.jsonl, DIR/batch-2-of-4.jsonl
+  std::string summary() const { return path("summary", ".json"); }
+  std::string table() const { return path("summary", ".tsv"); }
+
+  std::string directory;
+  std::uint32_t share, shares;  // from 1; 0: not divided
+
+ private:
+  std::string path(std::string_view name, std::string_view ending) const;
+};
 
 /// {"job":..., "outcome":..., ...}; the result is `value`.
 Json result_json(const BatchJob& job, const BatchResult& result, const Json& value);
@@ -32,42 +49,68 @@ class BatchRecord {
     RecordedLine line;
   };
 
-  /// Opens directory/batch.jsonl and creates both if absent. `resume` reads and continues the record; otherwise it starts
-  /// empty.
+  /// Opens the record and creates it and its directory if absent. `resume` reads and continues the record; otherwise it
+  /// starts empty.
   /// errors  kUsage: a record exists, and neither `resume` nor `overwrite` is set. kOutput: another run holds it, or the
   ///         system's reason
-  static Result<BatchRecord> open(const std::string& directory, bool resume, bool overwrite);
+  static Result<BatchRecord> open(const BatchFiles& files, bool resume, bool overwrite);
 
   const Earlier* earlier(const BatchJob& job) const;
   /// Of a job that ended and is kept; any thread may call it. errors  kOutput: the record cannot be read
   Result<BatchResult> kept(const Earlier& earlier) const;
 
   // --- from one thread at a time; errors  kOutput
+  /// The batch has so many jobs.
+  Status planned(std::size_t jobs);
   /// unowned  the output path holds unrecorded files: a later run must not treat them as its own
   Status begun(const BatchJob& job, bool unowned);
   /// The value of the result goes; its line is noted.
   Status ended(const BatchJob& job, BatchResult& result);
 
  private:
-  BatchRecord(std::string directory, Journal journal) : directory_(std::move(directory)), journal_(std::move(journal)) {}
+  BatchRecord(BatchFiles files, Journal journal) : files_(std::move(files)), journal_(std::move(journal)) {}
   Status append(const std::string& line);
 
-  std::string directory_;
+  BatchFiles files_;
   Journal journal_;
   std::map<Hash128, Earlier, HashOrder> earlier_;
 };
 
-/// Values of results that the record of a batch's directory has.
+/// Values of results that a record has.
 class RecordedValues {
  public:
-  explicit RecordedValues(const std::string& directory);
+  explicit RecordedValues(const BatchFiles& files) : path_(files.record()) {}
   /// errors  kOutput: the record cannot be read
   Result<Json> of(const BatchResult& result) { return result.line.bytes == 0 ? Result<Json>(result.value) : at(result.line); }
-  Result<Json> at(const RecordedLine& line);
+  Result<Json> at(const RecordedLine& line) {
+    Result<std::string> text = line_at(line);
+    return text ? value_in(*text) : text.error();
+  }
+  /// The line itself, without its end.
+  Result<std::string> line_at(const RecordedLine& line);
 
  private:
+  Result<Json> value_in(const std::string& line) const;
+
   std::string path_;
   std::optional<FileReader> file_;
 };
+
+/// The last run of a job in a record.
+struct RecordedJob {
+  BatchJob job;        // number, entry, id; its output is the position
+  BatchResult result;  // its value remains in the record
+  RecordedLine begun;  // empty if the job was recognized, not run
+  bool ended = false;
+  bool elsewhere = false;  // its output is relative to the working directory
+};
+
+struct RecordedBatch {
+  std::size_t planned = 0;                         // jobs; 0 if unknown
+  std::map<Hash128, RecordedJob, HashOrder> jobs;  // by their output, or by number without one
+};
+
+/// Reads a record, also of a batch that is running, and changes nothing. errors  kOutput: it cannot be read
+Result<RecordedBatch> read_record(const BatchFiles& files);
 
 }  // namespace lamina::pipeline

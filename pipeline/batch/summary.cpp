@@ -12,12 +12,6 @@
 namespace lamina::pipeline {
 namespace {
 
-std::string cell(std::string_view text) {
-  std::string line = one_line(text);
-  std::ranges::replace(line, '\t', ' ');
-  return line;
-}
-
 std::string warnings_text(std::size_t count) { return fmt::format("{} warning{}", count, count == 1 ? "" : "s"); }
 
 /// Totals of the batch.
@@ -44,6 +38,12 @@ BatchTotals totals_of(const std::vector<BatchResult>& results) {
 }
 
 }  // namespace
+
+std::string table_cell(std::string_view text) {
+  std::string line = one_line(text);
+  std::ranges::replace(line, '\t', ' ');
+  return line;
+}
 
 int batch_code(const BatchSummary& summary) {
   if (summary.interrupted) return static_cast<int>(Fault::kInterrupted);
@@ -82,13 +82,14 @@ Status write_batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& s
                {"max_running", summary.max_running},
                {"memory_budget_bytes", options.memory_bytes},
                {"max_need_bytes", summary.max_need_bytes},
-               {"peak_resident_bytes", summary.peak_resident_bytes},
-               {"jobs", Json::array()}};
+               {"peak_resident_bytes", summary.peak_resident_bytes}};
+  if (options.shares > 0) json["shard"] = fmt::format("{}/{}", options.share, options.shares);
+  json["jobs"] = Json::array();
   const std::string head = json_text(json, indent), line = indent < 0 ? "" : "\n" + std::string(indent, ' '),
                     own_line = indent < 0 ? "" : "\n" + std::string(2 * indent, ' ');
   const std::size_t end = head.rfind(']');  // of the jobs
   Status status = append(std::string_view(head).substr(0, end));
-  RecordedValues values(options.directory);
+  RecordedValues values(options.files());
   for (std::size_t i = 0; i < jobs.size() && status; ++i) {
     const Result<Json> value = values.of(summary.results[i]);
     if (!value) return value.error();
@@ -102,13 +103,23 @@ Status write_batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& s
   return append((jobs.empty() ? "" : line) + head.substr(end) + "\n");
 }
 
+Status write_summaries(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options,
+                       std::int64_t schema, const FileOptions& how) {
+  Result<File> file = File::open(options.files().summary(), how);
+  if (!file) return file.error();
+  const auto append = [&](std::string_view piece) { return file->append(piece); };
+  if (Status status = write_batch_json(jobs, summary, options, schema, 2, append); !status) return status;
+  if (const auto done = file->finish(); !done) return done.error();
+  return write_file(options.files().table(), batch_table(jobs, summary), how);
+}
+
 std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& summary) {
   std::string text = "job\toutcome\tcode\tseconds\tfiles\tbytes\toutput\tsource\treason\n";
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
     text += fmt::format("{}\t{}\t{}\t{:.3f}\t{}\t{}\t{}\t{}\t{}\n", jobs[i].number, outcome_name(result.outcome), result.code,
-                        result.seconds, result.output.files, result.output.bytes, cell(jobs[i].position()),
-                        cell(jobs[i].entry.source), cell(result.reason));
+                        result.seconds, result.output.files, result.output.bytes, table_cell(jobs[i].position()),
+                        table_cell(jobs[i].entry.source), table_cell(result.reason));
   }
   return text;
 }

@@ -5,9 +5,13 @@
 #include <vector>
 
 #include "pipeline/batch/queue.h"
+#include "stages/support/io/file.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
+
+/// The text on one line without tabs, for a table.
+std::string table_cell(std::string_view text);
 
 /// The exit code: 0 if every job is done or kept, 130 if the batch was interrupted, else the code of the first failed
 /// job in the list.
@@ -19,6 +23,10 @@ int batch_code(const BatchSummary& summary);
 /// errors  kOutput: the record cannot be read; of `append`
 Status write_batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options,
                         std::int64_t schema, int indent, const std::function<Status(std::string_view)>& append);
+
+/// Writes the summary and the table of a batch or a share. errors  kOutput
+Status write_summaries(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options,
+                       std::int64_t schema, const FileOptions& how);
 
 /// summary.tsv: a header, then one line per job: job, outcome, code, seconds, files, bytes, output, source, reason.
 std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& summary);

@@ -73,6 +73,15 @@ void Answer::say(std::string_view line) {
   status_ = context_.print(one_line(line) + "\n");
 }
 
+void complain_of(const Faults& faults, const std::string& directory, Context& context) {
+  for (const std::string& fault : faults.faults)
+    context.complain({Fault::kVerification, fmt::format("{}: {}", directory, fault)});
+  if (faults.fault_count > faults.faults.size()) {
+    context.complain(
+        {Fault::kVerification, fmt::format("{}: and {} more", directory, faults.fault_count - faults.faults.size())});
+  }
+}
+
 std::span<const Command* const> commands() { return kCommands; }
 
 const Command* find_command(std::string_view name) {

@@ -70,6 +70,9 @@ class Answer {
   Status status_;
 };
 
+/// Reports what is wrong with the files of a directory, a line each and the number of those that are not listed.
+void complain_of(const Faults& faults, const std::string& directory, Context& context);
+
 /// How a command ended. Messages and results go to the context; only the final error is here.
 struct Outcome {
   Outcome() = default;

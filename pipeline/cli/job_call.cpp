@@ -200,6 +200,10 @@ Result<Call> read_call(const std::vector<std::string>& words) {
     if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
   }
   call.names_sync = read->has("--sync") || is_named(planned, "run.sync") || spec.find("--sync") == nullptr;
+  if (spec.find("--layer") != nullptr) {
+    call.layer_mm = planned.layer_mm;
+    if (read->has("--layer")) read_number(read->text("--layer"), 1e-6, 1e6, "", call.layer_mm);
+  }
   call.parsed = packed(*line);
   call.inputs = read->operands;
   for (const auto& [flag, text] : read->options) {

@@ -2,14 +2,18 @@
 #include <tbb/info.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <numeric>
 
 #include "pipeline/batch/queue.h"
 #include "pipeline/batch/summary.h"
+#include "pipeline/batch/whole.h"
 #include "pipeline/cache/store.h"
+#include "pipeline/cli/batch_shares.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/job_call.h"
@@ -53,6 +57,9 @@ CommandSpec batch_spec() {
       {"--fail-fast", "", "stop the batch at the first failed job", "", "Run"},
       {"--resume", "", "continue a batch in DIR; finished jobs with valid files are kept", "", "Run"},
       {"--overwrite", "", "replace an earlier batch in DIR", "", "Run"},
+      {"--shard", "I/N", "run share I of N of the jobs, I from 1; see lamina merge", "", "Shares"},
+      {"--plan-shares", "N", "plan N shares by dry runs in DIR/shares.tsv; run no job", "", "Shares"},
+      {"--status", "", "print the progress of the batch in directory LIST", "", "Shares"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Run"},
       {"--quiet", "", "print errors only, one line per failed job", "", "Run"}};
   spec.closing =
@@ -63,6 +70,8 @@ CommandSpec batch_spec() {
       "  lamina batch parts/ --with 'jet --dpi 600 --format png' --jobs 4 --memory 8G -o out\n"
       "  lamina batch jobs.txt night/*.toml -o out --time-limit 3600\n"
       "  lamina batch jobs.txt -o out --resume\n"
+      "  lamina batch jobs.txt -o out --shard 2/4                    a quarter; lamina merge out when all are done\n"
+      "  lamina batch out --status\n"
       "  lamina batch parts/ --with info -o checked && jq -r '.jobs[] | [.source, .result.closed] | @tsv' checked/summary.json";
   return spec;
 }
@@ -93,6 +102,15 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
   if (options.jobs == 0) options.jobs = static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
   options.fail_fast = arguments.has("--fail-fast");
   if (options.fail_fast && arguments.has("--keep-going")) return usage("--keep-going and --fail-fast exclude each other");
+  std::array<std::uint32_t, 2> shard{};
+  if (arguments.has("--shard") && arguments.has("--plan-shares"))
+    return usage("--shard and --plan-shares exclude each other; plan first, then run each share");
+  if (Status status = arguments.read("--plan-shares", {1, 1'000'000}, options.shares); !status) return status.error();
+  if (arguments.has("--shard")) {
+    if (Status status = arguments.read("--shard", read_shard, shard); !status) return status.error();
+    options.share = shard[0] + 1;
+    options.shares = shard[1];
+  }
   options.resume = arguments.has("--resume");
   options.overwrite = arguments.has("--overwrite");
   if (options.resume && options.overwrite)
@@ -140,17 +158,53 @@ Result<Durable> read_sync(const Arguments& arguments) {
   return job.sync == Sync::kOff ? Durable::kNo : Durable::kAll;
 }
 
-Status write_summary(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options,
-                     const FileOptions& how) {
-  Result<File> file = File::open(options.directory + "/summary.json", how);
-  if (!file) return file.error();
-  const auto append = [&](std::string_view piece) { return file->append(piece); };
-  if (Status status = write_batch_json(jobs, summary, options, kJsonSchema, 2, append); !status) return status;
-  const auto done = file->finish();
-  return done ? Status() : Status(done.error());
+/// The progress of a batch in its directory.
+Outcome print_status(const Arguments& arguments, Context& context) {
+  if (arguments.operands.size() != 1)
+    return usage("--status: name the directory of one batch, as in lamina batch out --status");
+  for (const char* option : {"-o,--output", "--shard", "--plan-shares", "--resume", "--overwrite"}) {
+    if (arguments.has(option)) return at_option(option, "is of batches that run; remove --status");
+  }
+  const Result<BatchDirectory> batch = read_batch_directory(arguments.operands.front());
+  if (!batch) return batch.error();
+  const Status printed = arguments.has("--json") ? context.give(status_json(*batch)) : context.print(status_text(*batch));
+  return printed ? Outcome(batch->code()) : Outcome(printed);
+}
+
+/// Plans the shares and reports their costs.
+Outcome plan_only(std::vector<BatchEntry> entries, const BatchShare& share, const BatchOptions& options,
+                  const std::vector<std::string>& with, const Arguments& arguments, Context& context) {
+  BatchConsole console(arguments.has("--quiet"), context);
+  keep_on_signals();
+  BatchState state;
+  state.total = static_cast<std::uint32_t>(entries.size());
+  const auto progress = [&](std::size_t planned) {
+    state.ended = static_cast<std::uint32_t>(planned);
+    console.progress(state);
+  };
+  const Result<SharePlan> plan = plan_by_dry_runs(std::move(entries), share, options, with, progress, context.cancel());
+  console.clear();
+  if (!plan) return plan.error();
+  const std::vector<std::uint64_t> costs = plan->costs();
+  const double total = static_cast<double>(std::accumulate(costs.begin(), costs.end(), std::uint64_t{0}));
+  const double largest = static_cast<double>(std::ranges::max(costs)), mean = total / plan->shares;
+  const bool seconds = plan->unit == kPlannedUnit;
+  if (!arguments.has("--quiet")) {
+    std::string text = fmt::format("{}: {} jobs in {} shares", plan_path(options.directory), plan->jobs.size(), plan->shares);
+    if (seconds) text += fmt::format(", estimated on one processor: {} at most", readable_seconds(largest / 1e6));
+    context.say(text + fmt::format(", {:.3f} times the mean", largest / mean));
+  }
+  if (!arguments.has("--json")) return {};
+  Json reported = {{"command", "batch"},
+                   {"directory", options.directory},
+                   {"jobs_total", plan->jobs.size()},
+                   {"plan", {{"shares", plan->shares}, {"max_by_mean", largest / mean}}}};
+  if (seconds) reported["plan"]["max_seconds"] = largest / 1e6;
+  return context.give(reported);
 }
 
 Outcome run_batch_command(const Arguments& arguments, Context& context) {
+  if (arguments.has("--status")) return print_status(arguments, context);
   const bool quiet = arguments.has("--quiet");
   std::vector<std::string> with;
   const Result<Durable> durable = read_sync(arguments);
@@ -163,13 +217,16 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   if (!entries) return entries.error();
   const auto cache = open_cache(arguments);
   if (!cache) return cache.error();
-  auto prepared = prepare_batch(
-      std::move(*entries),
-      {options.directory, layer_share(options.memory_bytes, options.jobs), *cache ? &(*cache)->inputs() : nullptr}, read_call);
+  const BatchShare share{options.directory, layer_share(options.memory_bytes, options.jobs),
+                         *cache ? &(*cache)->inputs() : nullptr};
+  if (arguments.has("--plan-shares")) return plan_only(std::move(*entries), share, options, with, arguments, context);
+  auto prepared = options.shares > 0 ? prepare_share(std::move(*entries), share, options, with)
+                                     : prepare_undivided(std::move(*entries), share, options);
   if (!prepared) return prepared.error();
   const auto jobs = std::make_shared<const std::vector<BatchJob>>(std::move(*prepared));
-  Result<BatchRecord> record = BatchRecord::open(options.directory, options.resume, options.overwrite);
+  Result<BatchRecord> record = BatchRecord::open(options.files(), options.resume, options.overwrite);
   if (!record) return record.error();
+  if (Status status = options.shares > 0 ? Status() : record->planned(jobs->size()); !status) return status;
 
   BatchConsole console(quiet, context);
   keep_on_signals();  // jobs that are done
@@ -183,8 +240,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   console.clear();
   if (!summary) return summary.error();
   const FileOptions how{.follow = false, .durable = *durable};
-  Status written = write_summary(*jobs, *summary, options, how);
-  if (written) written = write_file(options.directory + "/summary.tsv", batch_table(*jobs, *summary), how);
+  const Status written = write_summaries(*jobs, *summary, options, kJsonSchema, how);
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
   if (*cache) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "pipeline/batch/check_batch.h"
+#include "pipeline/batch/whole.h"
 #include "pipeline/check/toolpaths.h"
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
@@ -23,9 +25,9 @@ CommandSpec verify_spec() {
   spec.summary =
       "Checks a job: file sizes and hashes, decoded pixels, files that do not belong to it, and a replay of the print\n"
       "program by the firmware's rules. G-code, also of other slicers, is replayed: heat, filament, layers, speeds and the\n"
-      "machine's limits. Exit code 5 for faults.";
+      "machine's limits. Of a batch, every output is compared with the record and verified. Exit code 5 for faults.";
   spec.operand = "DIR|GCODE|SML";
-  spec.operand_meaning = "directories of lamina jet or lamina slice, SML files, or G-code files of any slicer";
+  spec.operand_meaning = "directories of lamina jet, slice or batch, SML files, or G-code files of any slicer";
   spec.options = {{"--quote", "CSV", "write material and cost per part as CSV (one directory)", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""},
                   {"--machine", "NAME|FILE", "extrusion printer whose limits G-code must keep", "", ""},
@@ -83,6 +85,29 @@ void say_toolpaths(const VerifyReport& report, Answer& answer) {
   for (const auto& [name, what] : report.toolpaths->lines()) answer.say(fmt::format("{:<10}{}", name, what));
 }
 
+/// Verifies the directory of a batch. returns  the exit code
+Outcome verify_batch(const std::string& directory, const VerifyOptions& options, const Arguments& arguments, Context& context) {
+  if (arguments.has("--quote")) return at_option("--quote", "is of one job, and " + directory + " is of a batch");
+  const Result<BatchCheck> check = check_batch(directory, options);
+  if (!check) return check.error();
+  complain_of(*check, directory, context);
+  Answer answer(arguments, context);
+  if (check->ok()) {
+    answer.say(fmt::format("{}: {} jobs, {} files, {}, all as the record says", directory, readable_count(check->jobs),
+                           readable_count(check->files), readable_bytes(check->bytes)));
+    if (check->failed > 0) answer.say(fmt::format("{}: {} jobs failed and have no output", directory, check->failed));
+  }
+  if (Status status = answer.status(); !status) return status;
+  if (arguments.has("--json")) {
+    const Json json = {
+        {"command", "verify"},     {"directory", directory}, {"ok", check->ok()},     {"jobs", check->jobs},
+        {"failed", check->failed}, {"files", check->files},  {"bytes", check->bytes}, {"fault_count", check->fault_count},
+        {"faults", check->faults}};
+    if (Status status = context.give(json); !status) return status;
+  }
+  return check->ok() ? 0 : static_cast<int>(Fault::kVerification);
+}
+
 Outcome run_verify(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty()) return usage("no directory to verify; name one that lamina jet or lamina slice wrote");
   if (arguments.has("--quote") && arguments.operands.size() > 1)
@@ -106,17 +131,17 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
   int code = 0;
   Answer answer(arguments, context);
   for (const std::string& directory : arguments.operands) {
+    if (is_batch_directory(directory)) {
+      const Outcome outcome = verify_batch(directory, options, arguments, context);
+      code = std::max(code, outcome.error ? context.complain(*outcome.error) : outcome.code);
+      continue;
+    }
     const Result<VerifyReport> report = verify(directory, options);
     if (!report) {
       code = std::max(code, context.complain(report.error()));
       continue;
     }
-    for (const std::string& fault : report->faults)
-      context.complain({Fault::kVerification, fmt::format("{}: {}", directory, fault)});
-    if (report->fault_count > report->faults.size()) {
-      context.complain(
-          {Fault::kVerification, fmt::format("{}: and {} more", directory, report->fault_count - report->faults.size())});
-    }
+    complain_of(*report, directory, context);
     if (!report->ok()) code = std::max(code, static_cast<int>(Fault::kVerification));
     if (report->ok()) {
       answer.say(fmt::format("{}: {} layers, {}, {}", directory, readable_count(report->layers), readable_bytes(report->bytes),

@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <thread>
 #include <utility>
 
 #include "stages/data/shortage.h"
@@ -25,7 +27,42 @@ Error reason_of(const std::string& path, int code) {
   return {Fault::kOutput, fmt::format("{}: {}", path, std::strerror(code))};
 }
 
+/// Reads the lines. torn  set to whether the last one has no end
+Status read_lines(const std::string& path, const ReadLine& line, bool& torn) {
+  auto lines = FileReader::open(path, {.fault = Fault::kOutput, .longest_line = kLongestLine, .any_bytes = true});
+  if (!lines) return lines.error();
+  for (std::string_view text; lines->next(text);) {
+    torn = !lines->ended_by_break();
+    line(std::string(text), lines->offset() - text.size() - (torn ? 0 : 1));
+  }
+  return lines->status();
+}
+
+/// Tries again for a moment: is_journal_held() of another process has the lock briefly.
+bool lock_journal(int file) {
+  for (int attempt = 0; attempt < 20; ++attempt) {
+    if (::flock(file, LOCK_EX | LOCK_NB) == 0) return true;
+    if (errno != EWOULDBLOCK) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  errno = EWOULDBLOCK;
+  return false;
+}
+
 }  // namespace
+
+Status read_journal(const std::string& path, const ReadLine& line) {
+  bool torn = false;
+  return read_lines(path, line, torn);
+}
+
+bool is_journal_held(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+  if (file < 0) return false;
+  const bool held = ::flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(file);
+  return held;
+}
 
 Result<Journal> Journal::open(const std::string& path, std::string_view held) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
@@ -34,7 +71,7 @@ Result<Journal> Journal::open(const std::string& path, std::string_view held) {
   struct stat status {};
   if (::fstat(file, &status) != 0) return reason_of(path, errno);
   if (!S_ISREG(status.st_mode)) return Error{Fault::kOutput, fmt::format("{}: is a device or a pipe, not a file", path)};
-  if (::flock(file, LOCK_EX | LOCK_NB) == 0) return journal;
+  if (lock_journal(file)) return journal;
   if (errno != EWOULDBLOCK) return reason_of(path, errno);
   return Error{Fault::kOutput, fmt::format("{}: {}", path, held)};
 }
@@ -56,15 +93,7 @@ Status Journal::clear() {
   return ::ftruncate(file_, 0) == 0 ? Status() : reason_of(path_, errno);
 }
 
-Status Journal::read(const std::function<void(const std::string&, std::uint64_t at)>& line) {
-  auto lines = FileReader::open(path_, {.fault = Fault::kOutput, .longest_line = kLongestLine, .any_bytes = true});
-  if (!lines) return lines.error();
-  for (std::string_view text; lines->next(text);) {
-    torn_ = !lines->ended_by_break();
-    line(std::string(text), lines->offset() - text.size() - (torn_ ? 0 : 1));
-  }
-  return lines->status();
-}
+Status Journal::read(const ReadLine& line) { return read_lines(path_, line, torn_); }
 
 std::uint64_t Journal::end() const { return static_cast<std::uint64_t>(::lseek(file_, 0, SEEK_CUR)); }
 

@@ -13,6 +13,15 @@
 
 namespace lamina {
 
+/// Every line of a journal, in order, without its end, and where it begins; the last one may be torn.
+/// cost    reads the file once
+/// errors  kOutput: cannot be read, or a line of more than 64 MiB
+using ReadLine = std::function<void(const std::string& line, std::uint64_t at)>;
+Status read_journal(const std::string& path, const ReadLine& line);
+
+/// Whether a process has the journal open; false if there is none. Changes nothing.
+bool is_journal_held(const std::string& path);
+
 class Journal {
  public:
   /// Opens a file without changing it, or creates it empty.
@@ -26,9 +35,8 @@ class Journal {
   bool empty() const;
   /// Empties the file. errors  kOutput
   Status clear();
-  /// Every line so far, in order, without its end, and where it begins; the last one may be torn. cost  reads the file once
-  /// errors  kOutput: cannot be read, or a line of more than 64 MiB
-  Status read(const std::function<void(const std::string&, std::uint64_t at)>& line);
+  /// As read_journal().
+  Status read(const ReadLine& line);
   /// Adds a line, which ends with a line's end. errors  kOutput: one line with the path and the system's reason
   Status append(std::string line);
   std::uint64_t end() const;  // of the last line that was added

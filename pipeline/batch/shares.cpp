@@ -1,0 +1,283 @@
+#include "pipeline/batch/shares.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <numeric>
+#include <queue>
+#include <thread>
+#include <utility>
+
+#include "pipeline/batch/record.h"
+#include "pipeline/batch/summary.h"
+#include "pipeline/job/errors.h"
+#include "stages/load/load.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/journal.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/version.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kFirstLine = "lamina shares\t1\n", kColumns = "job\tshare\tcost\twords\tsource\n", kEnd = "end\t";
+constexpr std::uint64_t kStartBytes = 64 << 10;  // what it costs to start a job, in bytes of a part
+constexpr std::uint64_t kMaxShares = 1'000'000;  // of read_shard()
+
+/// Jobs of one part, or some of them.
+struct Piece {
+  std::uint64_t cost = 0;
+  std::vector<std::uint32_t> jobs;  // indices
+};
+
+/// Cuts the jobs of each part into pieces of at most `limit`, or of one job.
+std::vector<Piece> cut_pieces(std::span<const CostedJob> jobs, double limit) {
+  std::vector<Piece> pieces;
+  std::map<Hash128, std::size_t, HashOrder> open;  // the piece of each part that grows
+  for (std::uint32_t i = 0; i < jobs.size(); ++i) {
+    const auto [found, is_new] = open.try_emplace(jobs[i].part, pieces.size());
+    if (is_new || static_cast<double>(pieces[found->second].cost + jobs[i].cost) > limit) {
+      found->second = pieces.size();
+      pieces.emplace_back();
+    }
+    Piece& piece = pieces[found->second];
+    piece.cost += jobs[i].cost;
+    piece.jobs.push_back(i);
+  }
+  return pieces;
+}
+
+Error damaged_plan(const std::string& path) {
+  return failure(Fault::kVerification,
+                 "{}: is damaged; restore it, or remove it and the records of the shares and start the shares again", path);
+}
+
+/// The value of the next line, "name\tvalue", which is removed from the text; nothing if it has another name.
+std::optional<std::string_view> take_value(std::string_view& text, std::string_view name) {
+  const std::size_t end = text.find('\n');
+  if (end == std::string_view::npos || !text.starts_with(name) || text.substr(name.size(), 1) != "\t") return {};
+  const std::string_view value = text.substr(name.size() + 1, end - name.size() - 1);
+  text.remove_prefix(end + 1);
+  return value;
+}
+
+bool read_count(std::string_view text, std::uint64_t max, std::uint64_t& count) {
+  std::int64_t number = 0;
+  if (!read_whole(text, 0, static_cast<std::int64_t>(max), number).empty()) return false;
+  count = static_cast<std::uint64_t>(number);
+  return true;
+}
+
+bool read_planned_job(std::string_view line, std::size_t number, const SharePlan& plan, PlannedJob& job) {
+  const std::vector<std::string_view> cells = split(line, "\t");
+  std::uint64_t first = 0, share = 0;
+  if (cells.size() != 5 || !read_count(cells[0], UINT32_MAX, first) || first != number) return false;
+  if (!read_count(cells[1], plan.shares, share) || share == 0) return false;
+  if (!read_count(cells[2], kMaxJobCost, job.cost) || !read_hex(cells[3], job.words)) return false;
+  job.share = static_cast<std::uint32_t>(share);
+  job.source = cells[4];
+  return true;
+}
+
+std::string plan_text(const SharePlan& plan) {
+  std::string text = fmt::format("{}version\t{}\nshares\t{}\nwith\t{}\nunit\t{}\n{}", kFirstLine, plan.version, plan.shares,
+                                 plan.with, plan.unit, kColumns);
+  for (std::size_t i = 0; i < plan.jobs.size(); ++i) {
+    const PlannedJob& job = plan.jobs[i];
+    text += fmt::format("{}\t{}\t{}\t{}\t{}\n", i + 1, job.share, job.cost, hex(job.words), job.source);
+  }
+  return text + fmt::format("{}{}\n", kEnd, hex(hash_text(text)));
+}
+
+/// Whether a plan is that of this process. errors  of agree_on_plan()
+Status check_plan(const SharePlan& found, const SharePlan& own, const std::string& path) {
+  if (found.version != own.version) {
+    return usage("{}: a worker of another version: the shares are of lamina {}, this is lamina {}; use one version", path,
+                 found.version, own.version);
+  }
+  if (found.shares != own.shares) {
+    return usage("{}: divides the batch into {} shares, not {}; use that number, or divide it again with --overwrite", path,
+                 found.shares, own.shares);
+  }
+  if (found.with != own.with) {
+    return usage("{}: the shares have --with {}, not {}; use the same words, or divide the batch again with --overwrite", path,
+                 found.with, own.with);
+  }
+  const std::size_t both = std::min(found.jobs.size(), own.jobs.size());
+  for (std::size_t i = 0; i < both; ++i) {
+    if (found.jobs[i].words == own.jobs[i].words) continue;
+    return usage("{}: job {} differs from {}; restore the list, or divide it again with --overwrite", own.jobs[i].source, i + 1,
+                 path);
+  }
+  if (found.jobs.size() == own.jobs.size()) return {};
+  const bool longer = own.jobs.size() > both;
+  return usage("{}: job {} is {} {}; restore the list, or divide it again with --overwrite",
+               (longer ? own : found).jobs[both].source, both + 1, longer ? "not in" : "missing; it is in", path);
+}
+
+Status remove_files(const std::string& directory, bool (*is_file_of)(const std::string&)) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+    if (is_file_of(entry->path().filename().string())) files.push_back(entry->path());
+  }
+  std::ranges::sort(files);
+  for (const fs::path& file : files) {
+    if (file.extension() == ".jsonl" && is_journal_held(file.string()))
+      return failure(Fault::kOutput, "{}: is running in another process; wait for it", file.string());
+  }
+  for (const fs::path& file : files) {
+    if (!error) fs::remove(file, error);
+    if (error) return failure(Fault::kOutput, "{}: {}", file.string(), error.message());
+  }
+  return {};
+}
+
+bool is_undivided_file(const std::string& name) { return name.starts_with("batch.") || name.starts_with("summary."); }
+
+}  // namespace
+
+CostedJob FileCosts::of(const Call& call) {
+  std::uint64_t bytes = kStartBytes;
+  CostedJob result;
+  bool has_part = false;
+  for (const std::string& input : call.inputs) {
+    const std::string path = fs::path(input).lexically_normal().string();
+    const auto [known, is_new] = known_.try_emplace(hash_text(path), 0);
+    std::error_code error;
+    if (is_new && is_file(path)) known->second = load::part_bytes(path, fs::file_size(path, error));
+    if (known->second == 0 || error) continue;
+    bytes += known->second;
+    const bool part = load::is_part_name(path);
+    if (has_part || (result.part != Hash128() && !part)) continue;
+    result.part = known->first;
+    has_part = part;
+  }
+  const double layers_per_mm = call.layer_mm > 0 ? 1 / call.layer_mm : 1;
+  result.cost = static_cast<std::uint64_t>(
+      std::clamp(std::round(static_cast<double>(bytes) * layers_per_mm), 1.0, static_cast<double>(kMaxJobCost)));
+  return result;
+}
+
+std::vector<std::uint32_t> divide_jobs(std::span<const CostedJob> jobs, std::uint32_t shares) {
+  const auto add = [](std::uint64_t sum, const CostedJob& job) { return sum + job.cost; };
+  const auto total = static_cast<double>(std::accumulate(jobs.begin(), jobs.end(), std::uint64_t{0}, add));
+  std::vector<Piece> pieces = cut_pieces(jobs, 0.05 * total / shares);
+  std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
+  std::vector<std::uint32_t> result(jobs.size());
+  using Sum = std::pair<std::uint64_t, std::uint32_t>;  // cost, share
+  std::priority_queue<Sum, std::vector<Sum>, std::greater<>> sums;
+  for (std::uint32_t share = 1; share <= shares; ++share) sums.emplace(0, share);
+  for (const Piece& piece : pieces) {
+    const auto [sum, share] = sums.top();
+    sums.pop();
+    sums.emplace(sum + piece.cost, share);
+    for (const std::uint32_t job : piece.jobs) result[job] = share;
+  }
+  return result;
+}
+
+std::vector<std::uint64_t> SharePlan::costs() const {
+  std::vector<std::uint64_t> sums(shares);
+  for (const PlannedJob& job : jobs) sums[job.share - 1] += job.cost;
+  return sums;
+}
+
+Hash128 words_hash(const BatchJob& job) { return hash_text(fmt::format("{}\n{}", job.entry.words.text(), job.position())); }
+
+SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
+                      const std::vector<std::string>& with, std::string_view unit) {
+  SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), {}};
+  const std::vector<std::uint32_t> share_of = divide_jobs(costs, shares);
+  plan.jobs.reserve(jobs.size());
+  for (std::size_t i = 0; i < jobs.size(); ++i)
+    plan.jobs.push_back({share_of[i], costs[i].cost, words_hash(jobs[i]), table_cell(jobs[i].entry.source)});
+  return plan;
+}
+
+std::string plan_path(const std::string& directory) { return (fs::path(directory) / "shares.tsv").string(); }
+
+Result<SharePlan> read_plan(const std::string& directory) {
+  const std::string path = plan_path(directory);
+  const Result<std::string> read = read_file(path, {.max_bytes = 2 * kMaxListBytes});
+  if (!read) return read.error();
+  std::string_view text = *read;
+  const std::size_t end = text.rfind(kEnd);
+  Hash128 hash;
+  if (end == std::string_view::npos || !text.ends_with('\n') ||
+      !read_hex(text.substr(end + kEnd.size(), text.size() - end - kEnd.size() - 1), hash) ||
+      hash != hash_text(text.substr(0, end)) || !text.starts_with(kFirstLine)) {
+    return damaged_plan(path);
+  }
+  text = text.substr(0, end);
+  text.remove_prefix(kFirstLine.size());
+  SharePlan plan;
+  std::uint64_t shares = 0;
+  const auto version_text = take_value(text, "version"), count = take_value(text, "shares"), with = take_value(text, "with"),
+             unit = take_value(text, "unit");
+  if (!version_text || !count || !with || !unit || !read_count(*count, kMaxShares, shares) || shares == 0)
+    return damaged_plan(path);
+  plan.shares = static_cast<std::uint32_t>(shares);
+  plan.version = *version_text;
+  plan.with = *with;
+  plan.unit = *unit;
+  if (!text.starts_with(kColumns)) return damaged_plan(path);
+  text.remove_prefix(kColumns.size());
+  while (!text.empty()) {
+    const std::size_t line = text.find('\n');
+    PlannedJob job;
+    if (line == std::string_view::npos || !read_planned_job(text.substr(0, line), plan.jobs.size() + 1, plan, job))
+      return damaged_plan(path);
+    plan.jobs.push_back(std::move(job));
+    text.remove_prefix(line + 1);
+  }
+  return plan;
+}
+
+Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& own, bool overwrite) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
+  const std::string path = plan_path(directory);
+  while (true) {
+    bool replace = false;
+    if (has_shares(directory)) {
+      Result<SharePlan> found = read_plan(directory);
+      const Status status = found ? check_plan(*found, own, path) : Status(found.error());
+      if (status) return found;
+      if (!overwrite) return status.error();
+      replace = true;
+    }
+    const Status written = write_file(path, plan_text(own), {.follow = false, .replace = replace});
+    if (written) return own;
+    // Another process was faster, or is writing the file right now.
+    if (replace || (!has_shares(directory) && check_not_being_written(path))) return written.error();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+bool has_shares(const std::string& directory) { return is_file(plan_path(directory)); }
+
+bool has_undivided_batch(const std::string& directory) {
+  std::error_code error;
+  const std::string path = BatchFiles(directory).record();
+  return is_file(path) && fs::file_size(path, error) > 0 && !error;
+}
+
+Status remove_shares(const std::string& directory) {
+  return remove_files(directory, [](const std::string& name) { return is_batch_file(name) && !is_undivided_file(name); });
+}
+
+Status remove_undivided_batch(const std::string& directory) {
+  return remove_files(directory, [](const std::string& name) { return is_batch_file(name) && is_undivided_file(name); });
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,88 @@
+// pipeline/batch/shares.h: divides a list of jobs among processes that have only a directory in common.
+//
+// DIR/shares.tsv is the plan that all of them follow. The first process writes it; each of the others reads it and checks that
+// it would have planned the same list. Scheduling, retries and lost nodes are left to a scheduler.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pipeline/batch/job.h"
+#include "stages/data/status.h"
+#include "stages/support/hash/hash.h"
+
+namespace lamina::pipeline {
+
+/// What the division reads of a job.
+struct CostedJob {
+  std::uint64_t cost = 1;  // in any unit, 1 to kMaxJobCost
+  Hash128 part;            // of the path of its first part file; zero without one
+};
+inline constexpr std::uint64_t kMaxJobCost = std::uint64_t{1} << 40;
+
+/// Cost from the files alone: (64 KiB + expected memory of the input files) x layers per mm.
+/// cost  a system call per new file; `known` has those of earlier calls
+class FileCosts {
+ public:
+  CostedJob of(const Call& call);
+
+ private:
+  std::map<Hash128, std::uint64_t, HashOrder> known_;  // bytes by the names of files
+};
+
+/// The share of each job, from 1. Jobs of one part are cut, in order, into pieces of at most 5 % of a mean share. The dearest
+/// piece goes to the share with the smallest sum, the lower number first. If no job costs more than 5 % of a mean share, no
+/// share costs more than 1.05 times the mean.
+std::vector<std::uint32_t> divide_jobs(std::span<const CostedJob> jobs, std::uint32_t shares);
+
+inline constexpr std::string_view kPlannedUnit = "microseconds";  // of costs by dry runs
+
+struct PlannedJob {
+  std::uint32_t share = 0;  // from 1
+  std::uint64_t cost = 0;
+  Hash128 words;       // of its words and its output
+  std::string source;  // "jobs.txt:12"
+};
+
+/// The plan: docs/reference/formats.md describes the file.
+struct SharePlan {
+  std::uint32_t shares = 0;
+  std::string version;  // of lamina
+  std::string with;     // words of --with, as JSON
+  std::string unit;     // of the costs: kPlannedUnit or another one
+  std::vector<PlannedJob> jobs;
+
+  /// Sums of the costs of all shares.
+  std::vector<std::uint64_t> costs() const;
+};
+
+SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
+                      const std::vector<std::string>& with, std::string_view unit);
+
+/// Hash of the words and the output of a job.
+Hash128 words_hash(const BatchJob& job);
+
+/// DIR/shares.tsv
+std::string plan_path(const std::string& directory);
+
+/// errors  kVerification: the file is damaged or missing
+Result<SharePlan> read_plan(const std::string& directory);
+
+/// The plan in the directory, which is `own` if there was none. A different plan is replaced with `overwrite` only.
+/// errors  kUsage: another number of shares, other words of --with, another version, another list (names the first difference);
+///         kVerification: the file is damaged; kOutput
+Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& own, bool overwrite);
+
+/// Whether a directory belongs to a batch in shares; whether it belongs to one that is not divided.
+bool has_shares(const std::string& directory);
+bool has_undivided_batch(const std::string& directory);
+
+/// Removes the files of the shares, or of an undivided batch, not the output of their jobs.
+/// errors  kOutput: one of them is running; kOutput: a file cannot be removed
+Status remove_shares(const std::string& directory);
+Status remove_undivided_batch(const std::string& directory);
+
+}  // namespace lamina::pipeline
