@@ -9,7 +9,7 @@
 
 namespace lamina::pipeline {
 
-/// Reads a command line of at least one word: any command but batch and preview.
+/// Reads a command line of at least one word: any command but batch, watch and preview.
 /// errors  kUsage: no such command, wrong arguments, a job file that cannot be read
 Result<Call> read_call(const std::vector<std::string>& words);
 
