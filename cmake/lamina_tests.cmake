@@ -153,6 +153,8 @@ add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
          COMMAND ${PROJECT_SOURCE_DIR}/tests/cluster/slurm $<TARGET_FILE:lamina>)
 set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)
+add_test(NAME Watch.NoPartIsLostOrPlannedTwiceThoughTheWatcherIsKilled
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/watch/torture $<TARGET_FILE:lamina>)
 # The longest begin first, so that no core waits for the last of them.
 set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart Documentation.EveryExampleOfEveryCommandRuns
                      Documentation.EveryCommandOfTheGuidesPrintsWhatTheySay Golden.EveryJobWritesTheBytesOfTheTable PROPERTIES COST 100)
