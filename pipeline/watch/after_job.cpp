@@ -35,7 +35,7 @@ int start_shell(const std::string& command, const std::vector<std::string>& envi
   posix_spawnattr_setpgroup(&settings, 0);
   sigset_t signals;
   sigemptyset(&signals);
-  for (const int signal : {SIGPIPE, SIGXFSZ}) sigaddset(&signals, signal);  // which this program ignores
+  for (const int signal : {SIGPIPE, SIGXFSZ, SIGIO}) sigaddset(&signals, signal);  // which this program ignores
   posix_spawnattr_setsigdefault(&settings, &signals);
   const int reason = posix_spawn(&process, "/bin/sh", &files, &settings, arguments.data(), variables.data());
   posix_spawnattr_destroy(&settings);

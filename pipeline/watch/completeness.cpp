@@ -62,11 +62,10 @@ FileEnd gzip_end(const FileReader& file, const std::atomic<bool>& stop) {
   int members = 0;
   std::uint64_t expanded = 0;
   bool inside = true;
-  stream.avail_out = 1;
-  // A full buffer of output may have more behind it, even if all input was taken.
-  for (std::uint64_t read = 0; read < file.size() || stream.avail_in > 0 || (inside && stream.avail_out == 0);) {
+  // The last 8 bytes of a member are read after all of its output.
+  for (std::uint64_t read = 0; read < file.size() || stream.avail_in > 0;) {
     if (stop) return missing("not read");
-    if (stream.avail_in == 0 && read < file.size()) {
+    if (stream.avail_in == 0) {
       in.resize(static_cast<std::size_t>(std::min<std::uint64_t>(in.size(), file.size() - read)));
       if (!file.read_at(read, in)) return missing("changed while it was read");
       read += in.size();
@@ -94,12 +93,13 @@ FileEnd gzip_end(const FileReader& file, const std::atomic<bool>& stop) {
 
 FileEnd stl_end(const FileReader& file, std::string_view head) {
   if (file.size() < kStlHead) return missing(fmt::format("{} of at least {} bytes", file.size(), kStlHead));
-  const bool is_text = head.find('\0') == std::string_view::npos;
+  const std::string start = lower_case(head);
+  const bool has_facet = start.find("facet") != std::string::npos && start.find("vertex") != std::string::npos;
+  const bool is_text = has_facet || head.find('\0') == std::string_view::npos;
   if (!is_text) {
     const std::uint64_t bytes = kStlHead + kStlFacet * number_at(head, kStlHead - 4, 4);
     return file.size() < bytes ? missing(fmt::format("{} of {} bytes", file.size(), bytes)) : unstated();
   }
-  const std::string start = lower_case(head);
   if (start.find("solid") == std::string::npos && start.find("facet") == std::string::npos) return unstated();  // no STL
   return lower_case(tail_of(file, 4096)).find("endsolid") == std::string::npos ? missing("no endsolid") : unstated();
 }

@@ -30,7 +30,8 @@ struct WatchedFile {
   FileStamp stamp;
   Arrival arrival = Arrival::kUnknown;
   std::chrono::steady_clock::time_point unchanged_since;
-  std::optional<FileEnd> end;  // of this stamp, if it was read
+  bool writer_checked = false;  // for this stamp, without an event
+  std::optional<FileEnd> end;   // of this stamp, if it was read
 };
 
 class Folder {

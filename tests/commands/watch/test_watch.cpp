@@ -302,26 +302,25 @@ TEST_F(WatchedFolder, ARunningWatcherPlansWhatComesAndEndsWithItsSignal) {
 }
 
 TEST_F(WatchedFolder, AResultOfAPartThatWasReplacedIsDiscarded) {
-  const Outcome outcome = watch({"--with", "jet --bed 20x20 --dpi 2400 --layer 0.002"}, [&](int process) {
+  const Outcome outcome = watch({"--with", "jet --bed 20x20 --dpi 2400 --layer 0.01 --sync off"}, [&](int process) {
     put_box("new.stl", 12);
     put_box("newer.stl", 1);
     fs::rename(directory_ / "new.stl", directory_ / "in/a.stl");
     EXPECT_TRUE(wait_for("out/.watch"));
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
     fs::rename(directory_ / "newer.stl", directory_ / "in/a.stl");
     EXPECT_TRUE(wait_for("in/done/a.stl"));
     ::kill(process, SIGTERM);
   });
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(events("dropped").size(), 1u);
-  EXPECT_EQ(layers_of("out/a"), 500);
+  EXPECT_EQ(layers_of("out/a"), 100);
   EXPECT_FALSE(has("out/a-2"));
   EXPECT_EQ(files_below(directory_ / "in"), Words{"done/a.stl"});
 }
 
 TEST_F(WatchedFolder, AKilledWatcherContinuesItsPartAndItsCommand) {
   put_box("in/a.stl", 12);
-  const Words with = {"--with", "jet --bed 20x20 --dpi 1200 --layer 0.005"};
+  const Words with = {"--with", "jet --bed 20x20 --dpi 1200 --layer 0.01 --sync off"};
   const auto killed_at = [&](const std::string& file) {
     return [this, file](int process) {
       EXPECT_TRUE(wait_for(file));
@@ -341,7 +340,7 @@ TEST_F(WatchedFolder, AKilledWatcherContinuesItsPartAndItsCommand) {
   EXPECT_EQ(events("planned").size(), 1u);
   EXPECT_EQ(events("ended").size(), 1u);
   EXPECT_FALSE(has("out/.watch"));
-  EXPECT_EQ(layers_of("out/a"), 2400);
+  EXPECT_EQ(layers_of("out/a"), 1200);
   EXPECT_EQ(files_below(directory_ / "in"), Words{"done/a.stl"});
 }
 

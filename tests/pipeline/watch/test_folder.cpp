@@ -1,7 +1,9 @@
 // tests/pipeline/watch/test_folder.cpp: when a file of a watched folder counts as complete.
 #include "pipeline/watch/folder.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -61,6 +63,36 @@ TEST_F(FilesOfAFolder, AreCompleteAtOnceWhenTheirWriterClosesThemAndTheyStateThe
   EXPECT_FALSE(complete("open.stl"));
   open.close();
   EXPECT_TRUE(complete("open.stl"));
+}
+
+TEST_F(FilesOfAFolder, AreCompleteAtOnceEvenIfTheyCameBeforeTheEventsOfTheirFolder) {
+  fs::create_directories(directory_ / "sub");
+  put_box("sub/a.stl");
+  const int file = ::open((directory_ / "sub/a.stl").c_str(), O_RDONLY | O_CLOEXEC);
+  const bool has_leases = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0;
+  ::close(file);
+  if (!has_leases) GTEST_SKIP() << "a file system without leases";
+  EXPECT_TRUE(complete("sub/a.stl"));
+  std::ofstream open(directory_ / "sub/a.stl", std::ios::binary | std::ios::in);
+  Folder other = std::move(*Folder::open(directory_ / "sub", {}));
+  EXPECT_TRUE(other.scan().ok());
+  EXPECT_FALSE(other.is_complete("a.stl", 1000, kNoStop));
+  open.close();
+  other.take_events();
+  EXPECT_TRUE(other.scan().ok());
+  EXPECT_TRUE(other.is_complete("a.stl", 1000, kNoStop));
+}
+
+TEST_F(FilesOfAFolder, AreIncompleteWhileTheyAreWrittenEvenIfSizeAndTimeStay) {
+  put_box("a.stl");
+  EXPECT_TRUE(complete("a.stl"));
+  const auto time = fs::last_write_time(directory_ / "a.stl");
+  std::ofstream open(directory_ / "a.stl", std::ios::binary | std::ios::in);
+  open << "x" << std::flush;
+  fs::last_write_time(directory_ / "a.stl", time);
+  EXPECT_FALSE(complete("a.stl"));
+  open.close();
+  EXPECT_TRUE(complete("a.stl"));
 }
 
 TEST_F(FilesOfAFolder, AreCompleteAtOnceWhenTheyAreRenamedUnlessSomethingIsMissing) {
