@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <map>
 #include <set>
 #include <string>
@@ -35,7 +36,7 @@ class Candidates {
   /// active  names of jobs that run: they and their parts are left out
   void find(const std::set<std::string>& active, const std::atomic<bool>& stop);
 
-  std::vector<Candidate> ready;                       // by name
+  std::deque<Candidate> ready;                        // by name
   std::map<std::string, std::set<std::string>> used;  // by which jobs of the folder each file is read
   bool any_unsettled = false;                         // a file may become complete by time alone
   Fault left = Fault::kInterrupted;                   // what the first file that waits lacks; kInterrupted: no file waits

@@ -75,8 +75,8 @@ class FolderWatcher {
         folder_(std::move(folder)),
         candidates_(folder_, options.settings, read_) {}
 
-  Result<WatchSummary> run(WatchRecord record, const RunJob& run, std::string done, std::string failed,
-                           const std::atomic<bool>& interrupt) {
+  WatchSummary run(WatchRecord record, const RunJob& run, std::string done, std::string failed,
+                   const std::atomic<bool>& interrupt) {
     WatchShared& shared = running_->shared;
     shared.folder = options_.folder;
     shared.done = std::move(done);
@@ -96,7 +96,7 @@ class FolderWatcher {
     stop(interrupt);
     report();
     if (!summary_.abandoned) shared.record.reset();  // the next run may open it at once
-    if (fatal_) return *fatal_;
+    summary_.problem = fatal_;
     summary_.left = candidates_.left;
     if (summary_.left == Fault::kInterrupted && !waiting_.empty()) summary_.left = Fault::kOutput;
     return summary_;
@@ -169,7 +169,7 @@ class FolderWatcher {
         waiting_.erase(due);
       } else if (!candidates_.ready.empty()) {
         const Candidate candidate = std::move(candidates_.ready.front());
-        candidates_.ready.erase(candidates_.ready.begin());
+        candidates_.ready.pop_front();
         task = std::make_shared<WatchTask>();
         prepare_task(candidate, folder_, layer_share(options_.memory_bytes, options_.jobs), read_, *task);
         active_.insert(task->job.part);

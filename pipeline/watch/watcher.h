@@ -39,6 +39,7 @@ struct WatchSummary {
   std::uint32_t done = 0, failed = 0;
   int code = 0;                      // of the first job that failed
   Fault left = Fault::kInterrupted;  // why a file is left, of a watcher that ends by itself; kInterrupted: none is
+  std::optional<Error> problem;      // that ended the watcher: the record cannot be written, the folder not be read
   bool interrupted = false;
   bool abandoned = false;  // a job that ignored its stop is still running: the program must exit without waiting for it
 };

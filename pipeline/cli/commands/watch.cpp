@@ -144,7 +144,8 @@ Outcome run_watch_command(const Arguments& arguments, Context& context) {
       watch_folder(*options, read_call, job_runner(arguments.text("--sync")), observer, interrupt);
   if (!summary) return summary.error();
   if (!quiet) context.say(fmt::format("{} done, {} failed", summary->done, summary->failed));
-  const int code = printed ? watch_code(*summary, options->once) : context.complain(printed.error());
+  int code = printed ? watch_code(*summary, options->once) : context.complain(printed.error());
+  if (summary->problem) code = context.complain(*summary->problem);
   if (summary->abandoned) {  // a job that does not stop is still running
     remove_watched();
     std::_Exit(code);
