@@ -178,6 +178,20 @@ TEST_F(WatchedFolder, AJobWaitsForItsParts) {
   EXPECT_NE(read_text(directory_ / "out/broken.error.txt").find("broken.toml:2"), std::string::npos);
 }
 
+TEST_F(WatchedFolder, PartsWaitForAJobFileThatMayNameThem) {
+  write_text(directory_ / "in/sub/job.toml", "");
+  put_box("in/sub/a.stl");
+  put_box("in/b.stl");
+  const Outcome outcome = watch();
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.err.find("in/sub/job.toml: incomplete: it is empty"), std::string::npos) << outcome.err;
+  EXPECT_EQ(files_below(directory_ / "in"), (Words{"done/b.stl", "sub/a.stl", "sub/job.toml"}));
+  write_text(directory_ / "in/sub/job.toml", "[layers]\nthickness_mm = 1\n[[part]]\npath = 'a.stl'\n");
+  EXPECT_EQ(watch().code, 0);
+  EXPECT_EQ(layers_of("out/sub/job"), 2);
+  EXPECT_FALSE(has("out/sub/a"));
+}
+
 TEST_F(WatchedFolder, AFolderHasSettingsOfItsOwn) {
   put_box("in/a.stl");
   put_box("in/sub/b.stl");
@@ -320,27 +334,38 @@ TEST_F(WatchedFolder, AResultOfAPartThatWasReplacedIsDiscarded) {
 
 TEST_F(WatchedFolder, AKilledWatcherContinuesItsPartAndItsCommand) {
   put_box("in/a.stl", 12);
-  const Words with = {"--with", "jet --bed 20x20 --dpi 1200 --layer 0.01 --sync off"};
-  const auto killed_at = [&](const std::string& file) {
-    return [this, file](int process) {
-      EXPECT_TRUE(wait_for(file));
-      std::this_thread::sleep_for(std::chrono::milliseconds(30));
-      ::kill(process, SIGKILL);
-    };
+  const Words with = {"--with", "jet --bed 20x20 --dpi 2400 --layer 0.005 --sync off"};
+  // The size of the record of finished layers.
+  const auto recorded = [&] {
+    std::error_code gone;
+    std::uintmax_t bytes = 0;
+    for (fs::recursive_directory_iterator at(directory_ / "out/.watch", gone), end; !gone && at != end; at.increment(gone)) {
+      if (at->path().filename() == "manifest.json.part") bytes = fs::file_size(at->path(), gone);
+    }
+    return gone ? 0 : bytes;
   };
-  EXPECT_EQ(watch(with, killed_at("out/.watch")).code, 128 + SIGKILL);
+  const auto kill_with_layers = [&](int process) {
+    for (int i = 0; i < 10'000 && recorded() < 10'000; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(process, SIGKILL);
+  };
+  EXPECT_EQ(watch(with, kill_with_layers).code, 128 + SIGKILL);
   EXPECT_FALSE(has("out/a"));
   // Killed within the command after the job: it runs again, the part is not planned again.
   Words slow = with;
   slow.insert(slow.end(), {"--then", "echo x >> then.txt; test -e go || exec sleep 1000"});
-  EXPECT_EQ(watch(slow, killed_at("then.txt")).code, 128 + SIGKILL);
+  const auto kill_in_command = [&](int process) {
+    EXPECT_TRUE(wait_for("then.txt"));
+    ::kill(process, SIGKILL);
+  };
+  EXPECT_EQ(watch(slow, kill_in_command).code, 128 + SIGKILL);
   write_text(directory_ / "go", "");
   EXPECT_EQ(watch(slow).code, 0);
   EXPECT_EQ(read_text(directory_ / "then.txt"), "x\nx\n");
-  EXPECT_EQ(events("planned").size(), 1u);
+  ASSERT_EQ(events("planned").size(), 1u);
+  EXPECT_GT(events("planned")[0]["result"].value("layers_kept", 0), 0);
   EXPECT_EQ(events("ended").size(), 1u);
   EXPECT_FALSE(has("out/.watch"));
-  EXPECT_EQ(layers_of("out/a"), 1200);
+  EXPECT_EQ(layers_of("out/a"), 2400);
   EXPECT_EQ(files_below(directory_ / "in"), Words{"done/a.stl"});
 }
 
