@@ -33,6 +33,8 @@ else()
           FILES_MATCHING PATTERN "*.h")
 endif()
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
+install(FILES packaging/lamina-watch@.service DESTINATION lib/systemd/system COMPONENT program)
+install(FILES packaging/watch.conf DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples COMPONENT program)
 # The pages that the help and the manual pages name.
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program FILES_MATCHING PATTERN "*.md"
         PATTERN "*.png" PATTERN "*.svg" PATTERN "*.toml")

@@ -159,6 +159,8 @@ add_test(NAME Cluster.CommandsOfTheKubernetesFileAreOneBatch
 add_test(NAME Cluster.TheDaskBlockOfTheGuideIsOneBatch COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/cluster/dask_batch $<TARGET_FILE:lamina>)
 set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled Cluster.AListInSharesOnSlurmIsOneBatchThoughAWorkerIsKilled
                      Cluster.CommandsOfTheKubernetesFileAreOneBatch Cluster.TheDaskBlockOfTheGuideIsOneBatch PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)
+add_test(NAME Watch.NoPartIsLostOrPlannedTwiceThoughTheWatcherIsKilled
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/watch/torture $<TARGET_FILE:lamina>)
 # The longest begin first, so that no core waits for the last of them.
 set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart Documentation.EveryExampleOfEveryCommandRuns
                      Documentation.EveryCommandOfTheGuidesPrintsWhatTheySay Golden.EveryJobWritesTheBytesOfTheTable PROPERTIES COST 100)

@@ -26,7 +26,8 @@ constexpr const Command* kCommands[] = {&jet_command,     &slice_command,       
                                         &info_command,    &export_command,       &verify_command,     &calibrate_command,
                                         &compare_command, &permeability_command, &design_command,     &merge_command,
                                         &stream_command,  &convert_command,      &machines_command,   &preview_command,
-                                        &report_command,  &batch_command,        &cache_command,      &nest_command,       &completion_command, &manual_command};
+                                        &report_command,  &batch_command,        &watch_command,      &cache_command,
+                                        &nest_command,    &completion_command,   &manual_command};
 
 std::string program_help() {
   std::string text =

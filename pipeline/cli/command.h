@@ -130,6 +130,6 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
 // --- one file each in commands/, except plan.cpp (all commands that plan a job) and manual.cpp (also completion)
 extern const Command jet_command, slice_command, heights_command, extrude_command, info_command, export_command, verify_command, nest_command,
     calibrate_command, permeability_command, design_command, merge_command, stream_command, convert_command, compare_command,
-    machines_command, cache_command, preview_command, report_command, batch_command, completion_command, manual_command;
+    machines_command, preview_command, report_command, batch_command, watch_command, cache_command, completion_command, manual_command;
 
 }  // namespace lamina::pipeline

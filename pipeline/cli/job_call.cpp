@@ -115,12 +115,12 @@ struct CommandLine {
   Arguments arguments;
 };
 
-/// Reads a command line: any command but batch and preview. errors  kUsage: no such command, wrong arguments
+/// Reads a command line: any command but batch, watch and preview. errors  kUsage: no such command, wrong arguments
 Result<CommandLine> read_command_line(const std::vector<std::string>& words) {
   const std::string& name = words.front();
   const Command* command = find_command(name);
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
-  if (command == &batch_command || command->reads_itself)
+  if (command == &batch_command || command == &watch_command || command->reads_itself)
     return usage("'{}' cannot be a job of a batch; run it by itself", name);
   const CommandSpec& spec = spec_for(*command);
   Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});

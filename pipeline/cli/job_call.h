@@ -16,7 +16,7 @@ class JobCache;  // pipeline/cache/store.h
 /// The cache of --cache and --cache-link; none without them. errors  of JobCache::open; kUsage: --cache-link alone
 Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments);
 
-/// Reads a command line of at least one word: any command but batch and preview.
+/// Reads a command line of at least one word: any command but batch, watch and preview.
 /// errors  kUsage: no such command, wrong arguments, a job file that cannot be read
 Result<Call> read_call(const std::vector<std::string>& words);
 

@@ -68,7 +68,7 @@ constexpr OwnFile kOwnFiles[] = {
     {"stream", "-o,--output", true, {}},
 };
 /// Commands whose -o is a directory that they make, or may be.
-constexpr std::string_view kMakesFolders[] = {"jet", "slice", "convert", "merge", "manual", "calibrate", "batch"};
+constexpr std::string_view kMakesFolders[] = {"jet", "slice", "convert", "merge", "manual", "calibrate", "batch", "watch"};
 
 /// The folder of a file, or of what a link leads to.
 std::optional<FileId> folder_id(const std::string& file) {

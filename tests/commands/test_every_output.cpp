@@ -128,6 +128,7 @@ class EveryOutput : public ::testing::Test {
     fs::copy(tests / ".." / "pipeline/machine/shipped/extruders/anet-a8.toml", directory_ / "printer.toml");
     write_text(directory_ / "widths.csv", kWidths);
     write_text(directory_ / "list.txt", "info part.stl\n");
+    fs::create_directory(directory_ / "inbox");
     write_text(directory_ / "filament.ini", "temperature = 200\n");
     for (const Row& row : rows_of(false)) {
       const std::string& line = row.call;
@@ -316,7 +317,7 @@ TEST_F(EveryOutput, WhileAnotherRunWritesTheCallIsRefused) {
       auto taken = Claim::take(locked, locked);
       ASSERT_TRUE(taken.ok());
       claim.emplace(std::move(*taken));
-    } else if (row.command != "batch") {
+    } else if (row.command != "batch" && row.command != "watch") {
       auto opened = File::open(locked);
       ASSERT_TRUE(opened.ok());
       file.emplace(std::move(*opened));
@@ -354,9 +355,10 @@ TEST_F(EveryOutput, OfTwoThatBeginAtOnceWhatStaysIsWhole) {
         if (outcome.code > 0) refused(row, outcome);
       }
       EXPECT_EQ(unfinished(), std::vector<std::string>()) << row.call;
-      const std::string text = row.command == "batch" ? ""
-                               : row.directory        ? tree_text(directory_ / target)
-                                                      : read_text(directory_ / target);
+      const bool has_times = row.command == "batch" || row.command == "watch";
+      const std::string text = has_times       ? ""
+                               : row.directory ? tree_text(directory_ / target)
+                                               : read_text(directory_ / target);
       if (trial == 0) alone = text;
       EXPECT_TRUE(text == alone) << row.call;
     }
@@ -389,7 +391,8 @@ TEST_F(EveryOutput, AFullDiskIsOneLineAndNothingUnderAFinalName) {
     EXPECT_TRUE(!mounted || outcome.error_lines() == 1) << all_messages(outcome, row);
     EXPECT_TRUE(row.directory || !fs::exists(directory_ / target)) << row.call;
     for (const std::string& name : files_below(disk)) {
-      EXPECT_TRUE(name == "filler" || name.ends_with(".part") || name.ends_with("batch.jsonl")) << name << " " << row.call;
+      EXPECT_TRUE(name == "filler" || name.ends_with(".part") || name.ends_with("batch.jsonl") || name.ends_with("watch.jsonl"))
+          << name << " " << row.call;
     }
     if (mounted) {
       fs::remove(disk + "/filler");

@@ -39,6 +39,7 @@ constexpr More kMore[] = {
     {"preview", "[contours](../slice.md), [print programs](../print_program.md)"},
     {"report", "[what is on the page](../../howto/read_reports.md)"},
     {"batch", "[many jobs](../../howto/run_batches.md)"},
+    {"watch", "[watch a folder](../../howto/run_batches.md#watch-a-folder)"},
     {"completion", "[installing](../../howto/install.md)"},
     {"manual", "[installing](../../howto/install.md)"},
 };

@@ -18,6 +18,7 @@
 
 #include "stages/data/shortage.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/io/rename.h"
 #include "stages/support/io/sync.h"
 #include "stages/support/io/temporary.h"
 
@@ -122,11 +123,7 @@ struct File::State {
 
   int rename_to_target() const {
     if (options.replace) return std::rename(grows.c_str(), target.c_str()) == 0 ? 0 : errno;
-    // Not every file system can do that in one step.
-    if (::renameat2(AT_FDCWD, grows.c_str(), AT_FDCWD, target.c_str(), RENAME_NOREPLACE) == 0) return 0;
-    if (errno != EINVAL && errno != ENOSYS) return errno;
-    if (::faccessat(AT_FDCWD, target.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
-    return std::rename(grows.c_str(), target.c_str()) == 0 ? 0 : errno;
+    return rename_new(grows, target);
   }
 
   /// Network file systems report a full disk when a descriptor is closed: that of a locked file is closed twice, once

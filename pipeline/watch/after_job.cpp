@@ -1,0 +1,73 @@
+#include "pipeline/watch/after_job.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <thread>
+
+#include "pipeline/job/errors.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// returns  0 or the system's error number
+int start_shell(const std::string& command, const std::vector<std::string>& environment, pid_t& process) {
+  std::array<std::string, 3> words = {"/bin/sh", "-c", command};
+  std::array<char*, 4> arguments = {words[0].data(), words[1].data(), words[2].data(), nullptr};
+  std::vector<char*> variables;
+  for (const std::string& variable : environment) variables.push_back(const_cast<char*>(variable.c_str()));
+  variables.push_back(nullptr);
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&files, STDERR_FILENO, STDOUT_FILENO);
+  posix_spawnattr_t settings;
+  posix_spawnattr_init(&settings);
+  posix_spawnattr_setflags(&settings, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF);
+  posix_spawnattr_setpgroup(&settings, 0);
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGPIPE, SIGXFSZ, SIGIO}) sigaddset(&signals, signal);  // which this program ignores
+  posix_spawnattr_setsigdefault(&settings, &signals);
+  const int reason = posix_spawn(&process, "/bin/sh", &files, &settings, arguments.data(), variables.data());
+  posix_spawnattr_destroy(&settings);
+  posix_spawn_file_actions_destroy(&files);
+  return reason;
+}
+
+}  // namespace
+
+Result<std::optional<int>> run_shell(const std::string& command,
+                                     const std::vector<std::pair<std::string, std::string>>& variables,
+                                     const std::atomic<bool>& stop) {
+  std::vector<std::string> environment;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    if (!std::string_view(*variable).starts_with("LAMINA_")) environment.emplace_back(*variable);
+  }
+  for (const auto& [name, value] : variables) environment.push_back(fmt::format("{}={}", name, value));
+  pid_t process = 0;
+  if (const int reason = start_shell(command, environment, process); reason != 0)
+    return failure(Fault::kInternal, "/bin/sh: {}", std::strerror(reason));
+  bool stopped = false;
+  int status = 0;
+  for (pid_t ended = 0; (ended = ::waitpid(process, &status, WNOHANG)) != process;) {
+    if (ended < 0 && errno != EINTR) return failure(Fault::kInternal, "--then: {}", std::strerror(errno));
+    if (stop && !stopped) {
+      stopped = true;
+      ::kill(-process, SIGTERM);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  if (stopped) return std::optional<int>();
+  return std::optional<int>(WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status));
+}
+
+}  // namespace lamina::pipeline

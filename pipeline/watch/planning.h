@@ -1,0 +1,50 @@
+// pipeline/watch/planning.h: one job of a watched folder, from its inputs to its recorded end.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "pipeline/watch/candidates.h"
+#include "pipeline/watch/watcher.h"
+
+namespace lamina::pipeline {
+
+/// What the jobs of a watcher share.
+struct WatchShared {
+  std::string folder, done, failed;  // watched; of planned files
+  RunJob run;
+  std::mutex mutex;  // guards what follows, and names of results
+  std::optional<WatchRecord> record;
+  std::map<std::string, std::set<std::string>> used;  // by which jobs each file is read (Candidates)
+  std::set<std::string> moving;                       // jobs that use nothing any more
+};
+
+/// A job with what only its planning needs.
+struct WatchTask {
+  WatchedJob job;
+  BatchJob call;                 // command line; empty if the job is planned already
+  std::uint64_t need_bytes = 0;  // expected peak memory
+  std::atomic<bool> cancel{false};
+  // --- results
+  enum class End {
+    kEnded,    // recorded as ended
+    kChanged,  // an input changed: nothing is left of the job
+    kStopped,  // continues with the next run
+    kRetry     // planned, but not published, moved or ended; see `problem`
+  };
+  End end = End::kStopped;
+  std::optional<Error> problem;
+  std::optional<int> then_code;
+  bool fatal = false;  // the record cannot be written
+};
+
+/// Reads the command line of a candidate; its error becomes that of the job. Reads no part.
+void prepare_task(const Candidate& candidate, Folder& folder, std::uint64_t layer_bytes, const ReadCall& read, WatchTask& task);
+
+/// Does what is left of a job. `planned` is called once its result is recorded, by this thread.
+void run_task(WatchShared& shared, WatchTask& task, const std::function<void()>& planned);
+
+}  // namespace lamina::pipeline
