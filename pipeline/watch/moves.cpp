@@ -185,6 +185,13 @@ Status publish(WatchedJob& job, const std::function<Status(const WatchedJob&)>& 
   return {};
 }
 
+std::error_code make_work(const std::string& work) {
+  constexpr int kTries = 1000;  // another job may remove the empty folder of both in between
+  std::error_code error = std::make_error_code(std::errc::no_such_file_or_directory);
+  for (int i = 0; i < kTries && error == std::errc::no_such_file_or_directory; ++i) fs::create_directories(work, error);
+  return error;
+}
+
 void remove_work(const std::string& work) {
   std::error_code ignored;
   if (work.empty()) return;

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "pipeline/watch/record.h"
 #include "stages/data/status.h"
@@ -30,6 +31,8 @@ std::string result_path(const WatchedJob& job);
 /// errors   kOutput; of `again`
 Status publish(WatchedJob& job, const std::function<Status(const WatchedJob&)>& again);
 
+/// Makes a folder for unfinished work, while others are removed. returns  the system's reason if it cannot
+std::error_code make_work(const std::string& work);
 /// Removes a folder of unfinished work, and the folder of these if it is empty.
 void remove_work(const std::string& work);
 

@@ -77,7 +77,7 @@ void run_command_of(WatchShared& shared, WatchTask& task) {
   std::error_code error;
   const bool continues = call.can_continue && fs::exists(job.work, error);
   if (!continues) remove_work(job.work);
-  fs::create_directories(job.work, error);
+  error = make_work(job.work);
   if (error) return fail(job, {Fault::kOutput, fmt::format("{}: {}", job.work, error.message())});
   if (job.has_output) call.output = joined(job.work, fs::path(job.name).filename().string() + job.ending);
   CallSettings settings{call.output, call.layer_bytes, CallSettings::Earlier::kNone};
@@ -87,7 +87,7 @@ void run_command_of(WatchShared& shared, WatchTask& task) {
       call, settings, [](const ProgressEvent&) {}, task.cancel);
   if (continues && job.result.code != 0 && !task.cancel) {  // what a kill left may be of no use
     fs::remove_all(job.work, error);
-    fs::create_directories(job.work, error);
+    make_work(job.work);
     settings.earlier = CallSettings::Earlier::kNone;
     job.result = shared.run(
         call, settings, [](const ProgressEvent&) {}, task.cancel);
