@@ -1,6 +1,7 @@
 #include "pipeline/batch/job.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -155,9 +156,9 @@ class Preparation {
     for (const char* name : kOwnFiles) names_.insert(hash_text(name));
   }
 
-  void prepare(BatchJob& job, const ReadCall& read, const InspectCall& inspect) {
+  /// call  of the job's words
+  void prepare(BatchJob& job, Result<Call> call, const InspectCall& inspect) {
     const std::vector<std::string> words = job.entry.words.unpacked();
-    Result<Call> call = read(words);
     if (!call) {
       job.refused = call.error();
       if (inspect) inspect(job, {});
@@ -310,14 +311,21 @@ bool is_batch_file(std::string_view name) {
 
 Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read,
                                             const InspectCall& inspect) {
+  constexpr std::size_t kAtOnce = 1024;  // command lines, whose options take more than the jobs that stay
   Preparation preparation(share);
   std::vector<BatchJob> jobs;
   jobs.reserve(entries.size());
-  for (BatchEntry& entry : entries) {
-    BatchJob& job = jobs.emplace_back();
-    job.number = static_cast<std::uint32_t>(jobs.size());
-    job.entry = std::move(entry);
-    preparation.prepare(job, read, inspect);
+  std::vector<Result<Call>> calls;
+  for (std::size_t first = 0; first < entries.size(); first += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, entries.size() - first);
+    calls.assign(count, Error{});
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { calls[i] = read(entries[first + i].words.unpacked()); });
+    for (std::size_t i = 0; i < count; ++i) {
+      BatchJob& job = jobs.emplace_back();
+      job.number = static_cast<std::uint32_t>(jobs.size());
+      job.entry = std::move(entries[first + i]);
+      preparation.prepare(job, std::move(calls[i]), inspect);
+    }
   }
   if (Status status = check_apart(jobs, share.directory); !status) return status.error();
   return jobs;

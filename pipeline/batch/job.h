@@ -122,7 +122,7 @@ struct Call {
   PackedWords parsed;                              // for RunJob
 };
 
-/// Parses a command line of at least one word. errors  kUsage: invalid command line
+/// Parses a command line of at least one word; any thread. errors  kUsage: invalid command line
 using ReadCall = std::function<Result<Call>(const std::vector<std::string>& words)>;
 
 struct BatchJob {

@@ -28,6 +28,7 @@ constexpr std::string_view kTag =
     "Signature: 8a477f597d28d172789f06886806bc55\n"
     "# This folder is a cache of lamina, format 1. Its content can be removed at any time.\n";
 constexpr std::size_t kMaxEntryBytes = 256u << 20, kPieceBytes = 1u << 20;
+constexpr std::size_t kSmallBytes = 64u << 10, kMaxSmallBytes = 16u << 20;  // of an object, of all in memory
 
 /// A descriptor that is closed at the end.
 class OpenFile {
@@ -67,6 +68,17 @@ Result<bool> check_bytes(int file, const FileDigest& object, const std::function
     // A short piece is the last one of a regular file.
     if (static_cast<std::size_t>(got) < piece.size()) return done == object.bytes && hasher.take() == object.hash;
   }
+}
+
+/// Makes a file that is absent, of these bytes. errors  kOutput
+Status make_file(const std::string& path, std::string_view bytes) {
+  OpenFile to(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666));
+  if (to.get() < 0) return write_failure(path, errno);
+  int reason = write_all(to.get(), std::as_bytes(std::span(bytes)));
+  if (reason == 0 && ::close(to.release()) != 0) reason = errno;
+  if (reason == 0) return {};
+  ::unlink(path.c_str());
+  return write_failure(path, reason);
 }
 
 Status read_entry(const std::string& text, const Hash128& key, CacheEntry& entry) try {
@@ -195,6 +207,32 @@ std::vector<std::string> JobCache::take_notes() {
   return std::exchange(notes_, {});
 }
 
+Result<std::shared_ptr<const std::string>> JobCache::small_object(const FileDigest& object) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = small_.find(object.hash);
+    if (found != small_.end()) return found->second;
+  }
+  std::string read;
+  const auto take = [&](std::span<const char> piece) {
+    read.append(piece.data(), piece.size());
+    return Status();
+  };
+  if (Status status = stream(object, take); !status) return status.error();
+  auto bytes = std::make_shared<const std::string>(std::move(read));
+  const std::lock_guard lock(mutex_);
+  if (!small_.try_emplace(object.hash, bytes).second) return bytes;
+  small_order_.push_back(object.hash);
+  small_bytes_ += bytes->size();
+  while (small_bytes_ > kMaxSmallBytes) {
+    const auto oldest = small_.find(small_order_.front());
+    small_bytes_ -= oldest->second->size();
+    small_.erase(oldest);
+    small_order_.pop_front();
+  }
+  return bytes;
+}
+
 Status JobCache::copy_object(int from, const FileDigest& object, const std::string& path) {
   OpenFile to(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666));
   if (to.get() < 0) return write_failure(path, errno);
@@ -210,6 +248,10 @@ Status JobCache::copy_object(int from, const FileDigest& object, const std::stri
 }
 
 Status JobCache::fetch(const FileDigest& object, const std::string& path) {
+  if (!link_ && object.bytes <= kSmallBytes) {
+    const auto bytes = small_object(object);
+    return bytes ? make_file(path, **bytes) : bytes.error();
+  }
   const std::string source = position("objects", object.hash);
   const OpenFile from(::open(source.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
   if (from.get() < 0) return damaged(object.hash);

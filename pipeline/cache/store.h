@@ -12,12 +12,15 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/cache/input_digests.h"
@@ -35,6 +38,11 @@ struct CachedFile {
 struct CacheEntry {
   std::vector<CachedFile> files;
   Json facts;  // for the writer of the entry
+};
+
+/// For maps of hashes.
+struct HashLess {
+  bool operator()(const Hash128& a, const Hash128& b) const { return std::pair(a.high, a.low) < std::pair(b.high, b.low); }
 };
 
 class JobCache {
@@ -97,11 +105,16 @@ class JobCache {
   Status make_folder_of(const std::string& path) const;
   bool try_link(const std::string& object, const std::string& path);
   Status copy_object(int from, const FileDigest& object, const std::string& path);
+  Result<std::shared_ptr<const std::string>> small_object(const FileDigest& object);
 
   std::string folder_;
   std::atomic<bool> link_, full_{false};
   std::mutex mutex_;
-  std::vector<std::string> notes_;  // guarded by mutex_
+  std::vector<std::string> notes_;  // guarded by mutex_, as what follows
+  /// Small objects that were read and checked, for jobs that come often; the oldest go.
+  std::map<Hash128, std::shared_ptr<const std::string>, HashLess> small_;
+  std::deque<Hash128> small_order_;
+  std::size_t small_bytes_ = 0;
   InputDigests inputs_;
 };
 

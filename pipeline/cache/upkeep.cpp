@@ -14,11 +14,6 @@ namespace {
 
 constexpr std::int64_t kYoungS = 3600;
 
-/// For maps of hashes.
-struct HashLess {
-  bool operator()(const Hash128& a, const Hash128& b) const { return std::pair(a.high, a.low) < std::pair(b.high, b.low); }
-};
-
 Error interrupted() { return {Fault::kInterrupted, "interrupted; the cache is valid"}; }
 
 /// Objects with the number of entries that need them.
