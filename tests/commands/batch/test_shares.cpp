@@ -323,7 +323,9 @@ TEST_F(BatchInShares, VerifyComparesEveryOutputWithTheRecord) {
     const Outcome outcome = lamina(words);
     EXPECT_EQ(outcome.code, reported.empty() ? 0 : 5) << reported << outcome.err;
     EXPECT_NE(outcome.err.find(reported), std::string::npos) << outcome.err;
-    if (!reported.empty()) EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    if (!reported.empty()) {
+      EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    }
     return outcome.out;
   };
   EXPECT_EQ(share("1/2").code + share("2/2").code, 3);
