@@ -64,7 +64,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
         stop_all();
       }
       check_clocks();
-      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && running_ == 0 && unsynced_ == 0)) break;
+      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && running_ == 0 && (unsynced_ == 0 || is_sync_overdue()))) break;
       changed_.wait_for(lock, milliseconds(100));
     }
     report(watcher, lock);
@@ -87,22 +87,29 @@ class Queue : public std::enable_shared_from_this<Queue> {
     std::thread([self = shared_from_this()] { self->work(); }).detach();
   }
 
+  /// Whether a stopped batch has waited long enough for its disk. The jobs of the group have no end in the record then.
+  bool is_sync_overdue() {
+    if (!stopped_at_) stopped_at_ = Clock::now();
+    summary_.abandoned = summary_.abandoned || Clock::now() - *stopped_at_ > kGrace;
+    return Clock::now() - *stopped_at_ > kGrace;
+  }
+
   /// A thread that syncs what has ended since its last sync.
   void start_syncer() {
     directory_device_ = device_of(options_.directory);
+    folder_ = FolderSync::of({options_.directory});
     ++workers_;
     std::thread([self = shared_from_this()] { self->sync_groups(); }).detach();
   }
 
   void sync_groups() {
-    const FolderSync folder = FolderSync::of({options_.directory});
     std::unique_lock lock(mutex_);
     while (true) {
       changed_.wait(lock, [&] { return !group_.empty() || closed_; });
       if (group_.empty()) break;
       auto group = std::exchange(group_, {});
       lock.unlock();
-      const Status status = folder.sync();
+      const Status status = folder_->sync();
       lock.lock();
       for (auto& [i, result] : group) {
         --unsynced_;
@@ -118,6 +125,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
   bool syncs_in_group(const BatchJob& job) const {
     if (!options_.sync_in_groups || job.names_sync || job.below == 0) return false;
     std::filesystem::path folder = job.output;
+    std::error_code ignored;
+    if (std::filesystem::is_symlink(folder, ignored)) return false;  // its target may be elsewhere
     std::optional<std::uint64_t> device;
     while (!(device = device_of(folder.string())) && folder.has_parent_path()) folder = folder.parent_path();
     return device == directory_device_;
@@ -334,6 +343,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
   bool stopped_ = false, closed_ = false;
   std::vector<std::pair<std::size_t, BatchResult>> group_;  // ended, with files to be synced
   std::uint32_t unsynced_ = 0;                              // of the group, and of the one that is being synced
+  std::optional<Clock::time_point> stopped_at_;
+  std::optional<FolderSync> folder_;  // opened before anything is written
   std::optional<std::uint64_t> directory_device_;
   Status record_status_;
   BatchSummary summary_;

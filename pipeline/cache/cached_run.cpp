@@ -13,14 +13,17 @@
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/output/directory.h"
+#include "pipeline/output/print_program.h"
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/run/run.h"
 #include "pipeline/run/space.h"
 #include "stages/support/clocks.h"
 #include "stages/support/hash/tree.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/sync.h"
 #include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -39,6 +42,37 @@ std::string manifest_path_of(const Resolved& resolved) {
 const CachedFile* find_file(const CacheEntry& entry, std::string_view name) {
   const auto found = std::ranges::find(entry.files, name, &CachedFile::name);
   return found == entry.files.end() ? nullptr : &*found;
+}
+
+/// Whether the files are all that the manifest names, with their hashes. errors  kInput
+Status check_complete(const Manifest& manifest, const std::vector<CachedFile>& files) {
+  std::map<std::string_view, const FileDigest*> known;
+  for (const CachedFile& file : files) known[file.name] = &file.digest;
+  const auto check = [&](const std::string& name, const FileDigest* expected) -> Status {
+    const auto found = known.find(name);
+    if (found == known.end()) return failure(Fault::kInput, "{}: is missing", name);
+    const FileDigest& digest = *found->second;
+    const bool same = expected == nullptr || (digest.bytes == expected->bytes && digest.hash == expected->hash);
+    return same ? Status() : failure(Fault::kInput, "{}: differs from the manifest", name);
+  };
+  const ManifestHead& head = manifest.head;
+  if (head.product == Product::kMoves) return check(std::string(kToolpaths), &manifest.file);
+  std::vector<std::string> programs;  // compressed ones have other hashes in the manifest
+  if (!head.machine.empty()) {
+    programs = {"program/machine.toml", "program/start" + head.program_extension, "program/end" + head.program_extension};
+    for (const LayerRecord& record : manifest.layers)
+      programs.push_back(program_file_name(record.layer.index, head.program_extension));
+  }
+  for (const std::string& name : programs) {
+    if (Status status = check(name, nullptr); !status) return status;
+  }
+  for (const LayerRecord& record : manifest.layers) {
+    for (const LayerImageFile& image : layer_images(head, record)) {
+      const FileDigest digest{image.record.bytes, image.record.hash};
+      if (Status status = image.name.empty() ? Status() : check(image.name, &digest); !status) return status;
+    }
+  }
+  return {};
 }
 
 /// A job whose files come from an entry.
@@ -83,6 +117,7 @@ class CachedOutput {
     Result<Manifest> manifest = read_manifest(cache_.file_of(file->digest));
     if (!manifest || !manifest->complete) return failure(Fault::kInput, "no manifest");
     manifest_ = std::move(*manifest);
+    if (Status status = check_complete(manifest_, entry_.files); !status) return status;
     ManifestHead& head = manifest_.head;
     if (head.product != resolved_.product || head.parts.size() != job_.parts.size())
       return failure(Fault::kInput, "the manifest of another job");
@@ -95,7 +130,7 @@ class CachedOutput {
   Status check_free() const {
     std::uint64_t needed = 0;
     for (const CachedFile& file : entry_.files) needed += file.digest.bytes;
-    const auto space = free_space(job_.output);
+    const auto space = job_.overwrite ? std::nullopt : free_space(job_.output);  // the space of the earlier files is not known
     if (!space || space->bytes >= needed) return {};
     return failure(Fault::kOutput, "{}: the job needs {}, and {} are free; free some space, or name another folder with -o",
                    one_line(space->folder), readable_bytes(needed), readable_bytes(space->bytes));
@@ -128,6 +163,11 @@ class CachedOutput {
     }
     remove_waiting();
     manifest->discard();
+    for (const char* folder : kFolders) {
+      std::error_code ignored;
+      fs::remove(job_.output + "/" + folder, ignored);  // fails unless it is empty
+    }
+    made.take_back();
     return status;
   }
 
@@ -258,40 +298,76 @@ Result<std::optional<CachedRun>> take(JobCache& cache, const Hash128& key, const
   return std::optional<CachedRun>();
 }
 
-/// The files of a finished job, as objects. errors  of JobCache::add_object; kInput: files in its folders are not its own
-Result<std::vector<CachedFile>> add_files(JobCache& cache, const Resolved& resolved) {
-  std::vector<CachedFile> files;
-  const Job& job = resolved.job;
-  const auto add = [&](const std::string& name, const std::string& path, const std::optional<FileDigest>& expected) -> Status {
-    const auto digest = cache.add_object(path, expected);
-    if (digest) files.push_back({name, *digest});
-    return digest ? Status() : Status(digest.error());
+/// Whether a manifest is that of the job that ran, not of another that has replaced it.
+bool is_of_run(const ManifestHead& head, const Resolved& resolved, const Summary& summary) {
+  const auto fingerprints = [](const std::vector<PartSummary>& parts) {
+    std::vector<std::uint64_t> found;
+    for (const PartSummary& part : parts) found.push_back(part.fingerprint);
+    return found;
   };
-  const Result<Manifest> manifest = read_manifest(manifest_path_of(resolved));
+  return head.product == resolved.product && head.version == version() &&
+         head.job_toml == canonical_job_text(resolved.job, resolved.product) &&
+         fingerprints(head.parts) == fingerprints(summary.parts) && head.layer_count == summary.layers_total;
+}
+
+/// Names of the files in a folder of the output. errors  kInput: the folder cannot be read
+Result<std::vector<std::string>> names_in(const std::string& output, const char* folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator at(output + "/" + folder, error), end; !error && at != end; at.increment(error))
+    names.push_back(fmt::format("{}/{}", folder, at->path().filename().string()));
+  if (error && error != std::errc::no_such_file_or_directory)
+    return failure(Fault::kInput, "{}/{}: {}", output, folder, error.message());
+  return names;
+}
+
+/// Compares the print programs of a job, which were added, with their records: nothing has replaced them.
+Status check_programs(const std::string& output, const Manifest& manifest) {
+  const ManifestHead& head = manifest.head;
+  if (head.machine.empty()) return {};
+  const auto check = [&](const std::string& name, const Hash128& hash, std::optional<std::uint64_t> bytes) -> Status {
+    const auto digest = digest_content(output + "/" + name, bytes);
+    return digest && digest->hash == hash ? Status() : failure(Fault::kInput, "{}: was changed after it was written", name);
+  };
+  for (const LayerRecord& record : manifest.layers) {
+    const std::string name = program_file_name(record.layer.index, head.program_extension);
+    if (Status status = check(name, record.program.hash, record.program.bytes); !status) return status;
+  }
+  if (Status status = check("program/machine.toml", head.machine_profile, {}); !status) return status;
+  if (Status status = check("program/start" + head.program_extension, head.program_start, {}); !status) return status;
+  return check("program/end" + head.program_extension, head.program_end, {});
+}
+
+/// The files of a finished job, as objects.
+/// errors  of JobCache::add_object; kInput: another job has replaced files, or others are in its folders
+Result<std::vector<CachedFile>> add_files(JobCache& cache, const Resolved& resolved, const Summary& summary) {
+  const Job& job = resolved.job;
+  const auto own = cache.add_object(manifest_path_of(resolved));
+  if (!own) return own.error();
+  const Result<Manifest> manifest = read_manifest(cache.file_of(*own));  // a copy that nobody replaces
   if (!manifest) return manifest.error();
+  if (!manifest->complete || !is_of_run(manifest->head, resolved, summary))
+    return failure(Fault::kInput, "{}: was replaced by another job", job.output);
+  std::vector<CachedFile> files{{std::string(kManifest), *own}};
   if (resolved.product == Product::kMoves) {
-    if (Status status = add(std::string(kToolpaths), job.output, manifest->file); !status) return status.error();
-  } else {
-    const ManifestHead& head = manifest->head;
-    const LayersOfJob own{&head, head.first_layer, head.last_layer};
-    if (!stray_files(job.output, {&own, 1}).empty()) return failure(Fault::kInput, "{}: contains other files", job.output);
-    std::map<std::string, FileDigest> recorded;
-    for (const LayerRecord& record : manifest->layers) {
-      for (const LayerImageFile& image : layer_images(head, record))
-        recorded[image.name] = {image.record.bytes, image.record.hash};
-    }
-    for (const char* folder : kFolders) {
-      std::error_code error;
-      for (fs::directory_iterator entry(job.output + "/" + folder, error), end; !error && entry != end;
-           entry.increment(error)) {
-        const std::string name = fmt::format("{}/{}", folder, entry->path().filename().string());
-        const auto found = recorded.find(name);
-        const auto expected = found == recorded.end() ? std::optional<FileDigest>() : found->second;
-        if (Status status = add(name, entry->path().string(), expected); !status) return status.error();
-      }
+    const auto toolpaths = cache.add_object(job.output, manifest->file);
+    if (!toolpaths) return toolpaths.error();
+    files.push_back({std::string(kToolpaths), *toolpaths});
+    return files;
+  }
+  const LayersOfJob layers{&manifest->head, manifest->head.first_layer, manifest->head.last_layer};
+  if (!stray_files(job.output, {&layers, 1}).empty()) return failure(Fault::kInput, "{}: contains other files", job.output);
+  for (const char* folder : kFolders) {
+    const auto names = names_in(job.output, folder);
+    if (!names) return names.error();
+    for (const std::string& name : *names) {
+      const auto digest = cache.add_object(job.output + "/" + name, {}, true);
+      if (!digest) return digest.error();
+      files.push_back({name, *digest});
     }
   }
-  if (Status status = add(std::string(kManifest), manifest_path_of(resolved), {}); !status) return status.error();
+  if (Status status = check_complete(*manifest, files); !status) return status.error();
+  if (Status status = check_programs(job.output, *manifest); !status) return status.error();
   return files;
 }
 
@@ -299,7 +375,7 @@ Result<std::vector<CachedFile>> add_files(JobCache& cache, const Resolved& resol
 Status add(JobCache& cache, const Hash128& key, const Resolved& resolved, const Summary& summary) {
   InputDigests now;
   if (job_key(resolved, now).key != key) return failure(Fault::kInput, "a part changed while the job ran");
-  auto files = add_files(cache, resolved);
+  auto files = add_files(cache, resolved, summary);
   if (!files) return files.error();
   const double seconds = summary.load_seconds + summary.index_seconds + summary.layer_seconds;
   return cache.add(key, {std::move(*files), Json{{"seconds", seconds}, {"summary", summary_record(summary)}}});
@@ -309,6 +385,7 @@ Status add(JobCache& cache, const Hash128& key, const Resolved& resolved, const 
 
 Result<CachedRun> run_with_cache(JobCache& cache, Resolved resolved, const ProgressCallback& progress,
                                  const std::atomic<bool>& cancel) {
+  if (Status status = JobCache::check_apart(cache.folder(), resolved.job.output); !status) return status.error();
   const JobKey128 key = job_key(resolved, cache.inputs());
   if (key.key) {
     auto taken = take(cache, *key.key, resolved, progress, cancel);
@@ -319,7 +396,9 @@ Result<CachedRun> run_with_cache(JobCache& cache, Resolved resolved, const Progr
   const Resolved kept = resolved;
   Result<Summary> summary = run(std::move(resolved), progress, cancel);
   if (!summary) return summary.error();
-  const Status added = key.key ? add(cache, *key.key, kept, *summary) : Status(Error{Fault::kInput, key.reason});
+  const Status added = !key.key          ? Status(Error{Fault::kInput, key.reason})
+                       : cache.is_full() ? Status(Error{Fault::kInput, "the cache could not be written"})
+                                         : add(cache, *key.key, kept, *summary);
   if (!added && added.error().fault == Fault::kOutput) cache.note_not_added(added.error());
   const std::string text = added ? "added to " + cache.folder() : "not added: " + added.error().message;
   summary->facts["cache"] = added ? "added" : added.error().message;

@@ -28,6 +28,7 @@ constexpr std::string_view kTag =
     "Signature: 8a477f597d28d172789f06886806bc55\n"
     "# This folder is a cache of lamina, format 1. Its content can be removed at any time.\n";
 constexpr std::size_t kMaxEntryBytes = 256u << 20, kPieceBytes = 1u << 20;
+constexpr std::int64_t kYoungS = 3600;                                      // of temporary files, which a run may be writing
 constexpr std::size_t kSmallBytes = 64u << 10, kMaxSmallBytes = 16u << 20;  // of an object, of all in memory
 
 /// A descriptor that is closed at the end.
@@ -130,6 +131,24 @@ std::uint64_t size_of(const std::string& path) {
   return error ? 0 : size;
 }
 
+/// Takes the permission to write from a file. returns  whether it has none now
+bool protect(const std::string& path) {
+  struct stat facts {};
+  return ::stat(path.c_str(), &facts) == 0 && ::chmod(path.c_str(), facts.st_mode & 0444) == 0;
+}
+
+/// Whether a file or folder of this name may be part of a cache whose tag is missing: it is made or removed right now.
+bool is_of_cache(const std::string& name) {
+  return name == "jobs" || name == "objects" || name == "hits" || name == "misses" || name.starts_with("CACHEDIR.TAG");
+}
+
+Status make_tag(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return failure(Fault::kOutput, "{}: {}", folder, error.message());
+  return write_file(folder + "/CACHEDIR.TAG", kTag, {.lock = false, .durable = Durable::kNo});
+}
+
 }  // namespace
 
 Result<std::shared_ptr<JobCache>> JobCache::open(const std::string& folder, bool link) {
@@ -138,21 +157,34 @@ Result<std::shared_ptr<JobCache>> JobCache::open(const std::string& folder, bool
   if (error) return failure(Fault::kOutput, "{}: {}", folder, error.message());
   const std::string tag = folder + "/CACHEDIR.TAG";
   if (!fs::exists(tag, error)) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-      // Another process may be making the tag at the same time.
-      if (entry.path().filename().string().starts_with("CACHEDIR.TAG")) continue;
-      return usage("{}: contains {}, and is not a cache of lamina; name a new folder", folder,
-                   entry.path().filename().string());
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+      const std::string name = at->path().filename().string();
+      if (!is_of_cache(name))
+        return usage("{}: contains {}, and is not a cache of lamina; name a new folder", folder, one_line(name));
     }
     if (error) return failure(Fault::kOutput, "{}: {}", folder, error.message());
-    if (Status status = write_file(tag, kTag, {.lock = false, .durable = Durable::kNo}); !status) return status.error();
+    if (Status status = make_tag(folder); !status) return status.error();
   }
-  const Result<std::string> text = read_file(tag, {.fault = Fault::kUsage, .max_bytes = 4096});
+  const Result<std::string> text = read_file(tag, {.fault = Fault::kOutput, .max_bytes = 4096});
   if (!text) return text.error();
   if (*text != kTag) return usage("{}: is not a cache of this version of lamina; name another folder", folder);
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     return failure(Fault::kOutput, "{}: {}; the cache cannot be written", folder, std::strerror(errno));
   return std::shared_ptr<JobCache>(new JobCache(folder, link));
+}
+
+Status JobCache::check_apart(const std::string& folder, const std::string& output) {
+  std::error_code ignored;
+  const auto whole = [&](const std::string& path) {
+    const fs::path found = fs::weakly_canonical(fs::absolute(path, ignored), ignored);
+    return found.has_filename() ? found : found.parent_path();
+  };
+  const fs::path cache = whole(folder), other = whole(output);
+  const auto is_in = [](const fs::path& inner, const fs::path& outer) {
+    return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
+  };
+  if (output.empty() || (!is_in(cache, other) && !is_in(other, cache))) return {};
+  return usage("--cache {}: cache and output are in one another; name another folder", one_line(folder));
 }
 
 std::string JobCache::position(const char* kind, const Hash128& hash) const {
@@ -161,6 +193,10 @@ std::string JobCache::position(const char* kind, const Hash128& hash) const {
 }
 
 Status JobCache::make_folder_of(const std::string& path) const {
+  // A cache that was removed meanwhile begins anew, with its tag.
+  if (::access((folder_ + "/CACHEDIR.TAG").c_str(), F_OK) != 0) {
+    if (Status status = make_tag(folder_); !status) return status;
+  }
   std::error_code error;
   const fs::path folder = fs::path(path).parent_path();
   fs::create_directories(folder, error);
@@ -233,8 +269,8 @@ Result<std::shared_ptr<const std::string>> JobCache::small_object(const FileDige
   return bytes;
 }
 
-Status JobCache::copy_object(int from, const FileDigest& object, const std::string& path) {
-  OpenFile to(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666));
+Status JobCache::copy_object(int from, const FileDigest& object, const std::string& path, unsigned mode) {
+  OpenFile to(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, mode));
   if (to.get() < 0) return write_failure(path, errno);
   const bool cloned = object.bytes >= kPieceBytes && ::ioctl(to.get(), FICLONE, from) == 0;
   const auto write = [&](std::span<const char> bytes) {
@@ -256,13 +292,13 @@ Status JobCache::fetch(const FileDigest& object, const std::string& path) {
   const OpenFile from(::open(source.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
   if (from.get() < 0) return damaged(object.hash);
   Status status;
-  if (link_ && object.bytes > 0 && try_link(source, path)) {
+  if (link_ && object.bytes > 0 && protect(source) && try_link(source, path)) {
     // The name is linked before the bytes are read, so that both are of the same file.
     const OpenFile linked(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
     const Result<bool> whole = check_bytes(linked.get(), object, {});
     if (!whole || !*whole) status = damaged(object.hash);
   } else {
-    status = copy_object(from.get(), object, path);
+    status = copy_object(from.get(), object, path, 0666);
   }
   if (status) return status;
   ::unlink(path.c_str());
@@ -279,7 +315,16 @@ Status JobCache::stream(const FileDigest& object, const std::function<Status(std
   return damaged(object.hash);
 }
 
-Result<FileDigest> JobCache::add_object(const std::string& path, const std::optional<FileDigest>& expected) {
+JobCache::ObjectState JobCache::check(const FileDigest& object) {
+  const OpenFile from(::open(position("objects", object.hash).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  if (from.get() < 0 && errno == ENOENT) return ObjectState::kMissing;
+  const Result<bool> whole = from.get() < 0 ? Result<bool>(false) : check_bytes(from.get(), object, {});
+  if (whole && *whole) return ObjectState::kWhole;
+  remove_object(object.hash);
+  return ObjectState::kDamaged;
+}
+
+Result<FileDigest> JobCache::add_object(const std::string& path, const std::optional<FileDigest>& expected, bool may_link) {
   const Result<FileDigest> digest = digest_file(path);
   if (!digest) return failure(Fault::kInput, "{}", digest.error().message);
   if (expected && (expected->bytes != digest->bytes || expected->hash != digest->hash))
@@ -292,12 +337,12 @@ Result<FileDigest> JobCache::add_object(const std::string& path, const std::opti
   const std::string fresh = temporary_name(object);
   const int watched = watch(fresh.c_str());
   Status status;
-  if (link_ && digest->bytes > 0 && try_link(path, fresh)) {
-    if (::chmod(fresh.c_str(), 0444) != 0) status = write_failure(fresh, errno);
+  if (link_ && may_link && digest->bytes > 0 && try_link(path, fresh)) {
+    if (!protect(fresh)) status = write_failure(fresh, errno);
   } else {
     const OpenFile from(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    status =
-        from.get() < 0 ? failure(Fault::kInput, "{}: {}", path, std::strerror(errno)) : copy_object(from.get(), *digest, fresh);
+    status = from.get() < 0 ? failure(Fault::kInput, "{}: {}", path, std::strerror(errno))
+                            : copy_object(from.get(), *digest, fresh, 0444);
   }
   if (status && ::rename(fresh.c_str(), object.c_str()) != 0) status = write_failure(object, errno);
   remove_or_note(fresh);
@@ -309,6 +354,19 @@ Status JobCache::add(const Hash128& key, const CacheEntry& entry) {
   const std::string path = position("jobs", key);
   if (Status status = make_folder_of(path); !status) return status;
   return write_file(path, entry_text(key, entry), {.lock = false, .follow = false, .durable = Durable::kNo});
+}
+
+bool JobCache::has_entry(const Hash128& key) const { return ::access(position("jobs", key).c_str(), F_OK) == 0; }
+
+void JobCache::remove_leftovers(std::int64_t now_s) {
+  for (const char* kind : {"/jobs", "/objects"}) {
+    std::error_code error;
+    for (fs::recursive_directory_iterator at(folder_ + kind, error), end; !error && at != end; at.increment(error)) {
+      struct stat facts {};
+      if (named_by_temporary(at->path().filename().string()).empty() || ::lstat(at->path().c_str(), &facts) != 0) continue;
+      if (S_ISREG(facts.st_mode) && now_s - facts.st_mtim.tv_sec > kYoungSeconds) ::unlink(at->path().c_str());
+    }
+  }
 }
 
 void JobCache::remove(const Hash128& key) { ::unlink(position("jobs", key).c_str()); }

@@ -47,6 +47,9 @@ struct HashLess {
 
 class JobCache {
  public:
+  /// A file without an entry, or a temporary one, may belong to a running job up to this age.
+  static constexpr std::int64_t kYoungSeconds = 3600;
+
   /// Opens a folder, which is made if it is absent.
   /// link    files of jobs become hard links, without write permission, where the file system allows it
   /// errors  kUsage: the folder contains something else. kOutput: it cannot be made or written
@@ -67,17 +70,25 @@ class JobCache {
   Status stream(const FileDigest& object, const std::function<Status(std::span<const char>)>& take);
   /// The file of an object, to be read after stream() has accepted it.
   std::string file_of(const FileDigest& object) const { return position("objects", object.hash); }
-  /// Adds the bytes of a file. errors  kOutput; kInput: the file is not the one of `expected`
-  Result<FileDigest> add_object(const std::string& path, const std::optional<FileDigest>& expected = {});
+  enum class ObjectState { kWhole, kDamaged, kMissing };
+  /// Reads an object; a damaged one is removed.
+  ObjectState check(const FileDigest& object);
+  /// Adds the bytes of a file.
+  /// may_link  the file may become a name of the object, without write permission
+  /// errors    kOutput; kInput: the file is not the one of `expected`
+  Result<FileDigest> add_object(const std::string& path, const std::optional<FileDigest>& expected = {}, bool may_link = false);
   /// Adds an entry whose objects are there. errors  kOutput
   Status add(const Hash128& key, const CacheEntry& entry);
   /// Removes an entry whose objects are damaged.
   void remove(const Hash128& key);
   void count(bool hit);
+  /// errors  kUsage: the output is in the cache, or the cache in the output
+  static Status check_apart(const std::string& folder, const std::string& output);
 
   // --- what to report, once for each cache
-  /// Notes that files were not added; the first reason counts.
+  /// Notes that files were not added; the first reason counts. From now on nothing is added.
   void note_not_added(const Error& reason);
+  bool is_full() const { return full_; }
   /// Notes since the last call, a line each: no hard links were possible, jobs were not added.
   std::vector<std::string> take_notes();
 
@@ -98,13 +109,16 @@ class JobCache {
   std::uint64_t hits() const;
   std::uint64_t misses() const;
   void remove_object(const Hash128& hash);
+  bool has_entry(const Hash128& key) const;
+  /// Removes temporary files of killed runs, which are older than an hour. now_s  since 1970
+  void remove_leftovers(std::int64_t now_s);
 
  private:
   JobCache(std::string folder, bool link) : folder_(std::move(folder)), link_(link) {}
   std::string position(const char* kind, const Hash128& hash) const;
   Status make_folder_of(const std::string& path) const;
   bool try_link(const std::string& object, const std::string& path);
-  Status copy_object(int from, const FileDigest& object, const std::string& path);
+  Status copy_object(int from, const FileDigest& object, const std::string& path, unsigned mode);
   Result<std::shared_ptr<const std::string>> small_object(const FileDigest& object);
 
   std::string folder_;

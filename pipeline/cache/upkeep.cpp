@@ -12,8 +12,6 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::int64_t kYoungS = 3600;
-
 Error interrupted() { return {Fault::kInterrupted, "interrupted; the cache is valid"}; }
 
 /// Objects with the number of entries that need them.
@@ -49,6 +47,7 @@ Result<CacheSize> measure_cache(const JobCache& cache) {
 }
 
 Result<TrimmedCache> trim_cache(JobCache& cache, std::uint64_t max_bytes, std::int64_t now_s, const std::atomic<bool>& cancel) {
+  cache.remove_leftovers(now_s);
   auto entries = cache.entries();
   if (!entries) return entries.error();
   const auto objects = cache.objects();
@@ -81,7 +80,7 @@ Result<TrimmedCache> trim_cache(JobCache& cache, std::uint64_t max_bytes, std::i
     return uses.erase(use);
   };
   for (auto use = uses.begin(); use != uses.end();) {
-    use = use->second.entries == 0 && now_s - use->second.made_s > kYoungS ? remove(use) : std::next(use);
+    use = use->second.entries == 0 && now_s - use->second.made_s > JobCache::kYoungSeconds ? remove(use) : std::next(use);
   }
   for (std::size_t i = 0; i < entries->size() && bytes > max_bytes; ++i) {
     if (cancel) return interrupted();
@@ -98,24 +97,25 @@ Result<TrimmedCache> trim_cache(JobCache& cache, std::uint64_t max_bytes, std::i
 }
 
 Result<CheckedCache> check_cache(JobCache& cache, const std::atomic<bool>& cancel) {
+  using State = JobCache::ObjectState;
+  const auto entries = cache.entries();  // before the objects: those of entries that are added meanwhile are there
+  if (!entries) return entries.error();
   const auto objects = cache.objects();
   if (!objects) return objects.error();
   CheckedCache checked;
   std::map<Hash128, std::uint64_t, HashLess> whole;
   for (const JobCache::ObjectFile& object : *objects) {
     if (cancel) return interrupted();
+    const State state = cache.check({object.bytes, object.hash});
+    if (state == State::kMissing) continue;  // trimmed meanwhile
     ++checked.objects;
     checked.bytes += object.bytes;
-    if (cache.stream({object.bytes, object.hash}, {})) {
-      whole[object.hash] = object.bytes;
-    } else {
-      checked.damaged.push_back(fmt::format("object {}: its bytes are others", hex(object.hash)));
-    }
+    if (state == State::kWhole) whole[object.hash] = object.bytes;
+    if (state == State::kDamaged) checked.damaged.push_back(fmt::format("object {}: its bytes are others", hex(object.hash)));
   }
-  const auto entries = cache.entries();
-  if (!entries) return entries.error();
   for (const JobCache::EntryFile& file : *entries) {
     if (cancel) return interrupted();
+    if (!cache.has_entry(file.key)) continue;
     ++checked.entries;
     checked.bytes += file.bytes;
     const auto entry = cache.inspect(file.key);
@@ -125,9 +125,10 @@ Result<CheckedCache> check_cache(JobCache& cache, const std::atomic<bool>& cance
     }
     const auto missing = std::ranges::find_if(entry->files, [&](const CachedFile& needed) {
       const auto found = whole.find(needed.digest.hash);
-      return found == whole.end() || found->second != needed.digest.bytes;
+      if (found != whole.end()) return found->second != needed.digest.bytes;
+      return cache.check(needed.digest) != State::kWhole;
     });
-    if (missing == entry->files.end()) continue;
+    if (missing == entry->files.end() || !cache.has_entry(file.key)) continue;
     cache.remove(file.key);
     checked.damaged.push_back(fmt::format("entry {}: {} is missing or damaged", hex(file.key), missing->name));
   }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -157,22 +156,17 @@ CommandLine unpacked(const BatchJob& job) {
 
 }  // namespace
 
-Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments) {
-  const std::string folder = arguments.text("--cache");
+Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments, Context& context) {
   if (!arguments.has("--cache")) {
     if (arguments.has("--cache-link")) return at_option("--cache-link", "needs --cache FOLDER").error();
     return std::shared_ptr<JobCache>();
   }
-  namespace fs = std::filesystem;
-  std::error_code ignored;
-  const auto whole = [&](const std::string& path) { return fs::weakly_canonical(fs::absolute(path, ignored), ignored); };
-  const fs::path cache = whole(folder), output = whole(arguments.text("-o,--output"));
-  for (const auto& [inner, outer] : {std::pair(cache, output), std::pair(output, cache)}) {
-    if (std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end() &&
-        arguments.has("-o,--output"))
-      return at_option("--cache", folder + ": cache and output are in one another; name another folder").error();
-  }
-  return JobCache::open(folder, arguments.has("--cache-link"));
+  const std::string folder = arguments.text("--cache");
+  if (Status status = JobCache::check_apart(folder, arguments.text("-o,--output")); !status) return status.error();
+  auto cache = JobCache::open(folder, arguments.has("--cache-link"));
+  if (cache || cache.error().fault != Fault::kOutput) return cache;
+  context.say("note: --cache " + cache.error().message + "; jobs run without it");
+  return std::shared_ptr<JobCache>();
 }
 
 Result<Call> read_call(const std::vector<std::string>& words) {
@@ -199,7 +193,9 @@ Result<Call> read_call(const std::vector<std::string>& words) {
     call.layer_bytes = 0;
     if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
   }
-  call.names_sync = read->has("--sync") || is_named(planned, "run.sync") || spec.find("--sync") == nullptr;
+  const bool sets_sync = std::ranges::any_of(
+      read->all("--set"), [](const std::string& assignment) { return assignment.starts_with("run.sync"); });
+  call.names_sync = read->has("--sync") || is_named(planned, "run.sync") || sets_sync || spec.find("--sync") == nullptr;
   if (spec.find("--layer") != nullptr) {
     call.layer_mm = planned.layer_mm;
     if (read->has("--layer")) read_number(read->text("--layer"), 1e-6, 1e6, "", call.layer_mm);

@@ -11,10 +11,12 @@
 
 namespace lamina::pipeline {
 
+class Context;   // pipeline/cli/command.h
 class JobCache;  // pipeline/cache/store.h
 
-/// The cache of --cache and --cache-link; none without them. errors  of JobCache::open; kUsage: --cache-link alone
-Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments);
+/// The cache of --cache and --cache-link; none without them, or, with a note, where it cannot be written.
+/// errors  kUsage: the folder is no cache, or in the output; --cache-link alone
+Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments, Context& context);
 
 /// Reads a command line of at least one word: any command but batch, watch and preview.
 /// errors  kUsage: no such command, wrong arguments, a job file that cannot be read

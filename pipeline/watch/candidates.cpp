@@ -48,7 +48,11 @@ void Candidates::find(const std::set<std::string>& active, const std::atomic<boo
     if (!active.contains(file)) add_job(file);
   }
   for (const auto& [file, state] : folder_.files()) {
-    if (!active.contains(file) && !is_toml_name(file)) add_part(file);
+    if (is_toml_name(file) || named_.contains(file)) continue;
+    // Parts that are being planned still need their job file.
+    used[file].insert(file);
+    if (const auto job = by_stem_.find(stem_of(file)); job != by_stem_.end()) used[job->second].insert(file);
+    if (!active.contains(file)) add_part(file);
   }
   for (const auto& [file, line] : waiting_) {
     std::string& before = reported_[file];
@@ -67,7 +71,12 @@ void Candidates::waits(const std::string& file, Fault fault, const std::string& 
 
 bool Candidates::is_complete(const std::string& file) {
   const double settle = settings_of(folder_of(file)).settings.settle_seconds;
-  const WatchedFile& state = folder_.files().at(file);
+  const auto found = folder_.files().find(file);
+  if (found == folder_.files().end()) {  // removed since it was named
+    any_unsettled = true;
+    return false;
+  }
+  const WatchedFile& state = found->second;
   if (folder_.is_complete(file, settle, *stop_)) return true;
   if (Folder::stays_incomplete(state, settle)) {
     const std::string path = folder_.path_of(file);
@@ -91,7 +100,11 @@ const Candidates::SettingsOfFolder& Candidates::settings_of(const std::string& f
     const double settle = found.settings.settle_seconds;
     if (!folder_.is_complete(file, settle, *stop_)) {
       found.valid = false;
-      any_unsettled = true;
+      if (Folder::stays_incomplete(state->second, settle)) {
+        waits(file, Fault::kUsage, folder_.path_of(file) + ": is empty or incomplete; its parts wait");
+      } else {
+        any_unsettled = true;
+      }
     } else if (Status read = read_watch_file(folder_.path_of(file), folder_.root(), read_, found.settings); !read) {
       found.valid = false;
       waits(file, Fault::kUsage, read.error().message + "; its parts wait");
@@ -122,7 +135,12 @@ void Candidates::read_job_files() {
         below.empty() || !folder_.files().contains(below) ? job.outside.push_back(part.path) : job.inside.push_back(below);
       }
     }
-    // A part may have come since the job was read.
+    // A part may have gone or come since the job was read.
+    std::erase_if(job.inside, [&](const std::string& part) {
+      if (folder_.files().contains(part)) return false;
+      job.outside.push_back(folder_.path_of(part));
+      return true;
+    });
     std::erase_if(job.outside, [&](const std::string& path) {
       const std::string below = below_root(path, folder_.root());
       const bool inside = !below.empty() && folder_.files().contains(below);
@@ -175,16 +193,13 @@ void Candidates::add_job(const std::string& file) {
 
 void Candidates::add_part(const std::string& file) {
   const std::string folder = folder_of(file);
-  if (named_.contains(file)) return;
   if (!is_utf8(file)) return waits(file, Fault::kUsage, folder_.path_of(file) + ": the name is not UTF-8; rename it");
   const SettingsOfFolder& settings = settings_of(folder);
   Candidate found{file, "", {file}, {}, settings.settings};
   if (const auto job = by_stem_.find(stem_of(file)); job != by_stem_.end()) {
     found.job_file = job->second;
     found.inside.push_back(job->second);
-    used[job->second].insert(file);
   }
-  used[file].insert(file);
   if (is_complete(file) && settings.valid && !is_held(folder)) ready.push_back(std::move(found));
 }
 

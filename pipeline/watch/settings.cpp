@@ -83,12 +83,14 @@ Status check_output(const std::string& output, const std::string& root) {
 }
 
 Status read_watch_file(const std::string& path, const std::string& root, const ReadCall& read, FolderSettings& settings) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) == 0 &&
+  auto file = FileReader::open(path, {.fault = Fault::kUsage, .max_bytes = kMaxTomlBytes});
+  if (!file) return file.error();
+  struct stat status {};  // of the file that is read; another may get its name meanwhile
+  if (::fstat(file->descriptor(), &status) != 0 ||
       ((status.st_uid != ::geteuid() && status.st_uid != 0) || (status.st_mode & (S_IWGRP | S_IWOTH)) != 0)) {
     return usage("{}: other users may write it, and it runs commands; change it with chown and chmod go-w", path);
   }
-  const auto text = read_file(path, {.fault = Fault::kUsage, .max_bytes = kMaxTomlBytes});
+  const auto text = file->text();
   if (!text) return text.error();
   const Result<TomlValue> table = read_toml(*text, path);
   if (!table) return table.error();

@@ -215,7 +215,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const BatchOptions& options = *read;
   Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
-  const auto cache = open_cache(arguments);
+  const auto cache = open_cache(arguments, context);
   if (!cache) return cache.error();
   const BatchShare share{options.directory, layer_share(options.memory_bytes, options.jobs),
                          *cache ? &(*cache)->inputs() : nullptr};

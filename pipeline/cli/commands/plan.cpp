@@ -158,7 +158,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (event.stage == ProgressEvent::Stage::kLayers) keep_job();
     context.progress(event);
   };
-  const auto own_cache = open_cache(arguments);
+  const auto own_cache = open_cache(arguments, context);
   if (!own_cache) return own_cache.error();
   JobCache* const cache = *own_cache ? own_cache->get() : context.cache();
   Result<CachedRun> finished = run_or_take(cache, std::move(*resolved), progress, context.cancel());
