@@ -178,6 +178,37 @@ TEST_F(WatchedFolder, AJobWaitsForItsParts) {
   EXPECT_NE(read_text(directory_ / "out/broken.error.txt").find("broken.toml:2"), std::string::npos);
 }
 
+TEST_F(WatchedFolder, APartThatIsRemovedIsWaitedForAgain) {
+  write_text(directory_ / "in/job.toml", "[layers]\nthickness_mm = 1\n[[part]]\npath = 'a.stl'\n[[part]]\npath = 'b.stl'\n");
+  put_box("in/a.stl");
+  const Outcome outcome = watch({"--jobs", "1"}, [&](int process) {
+    EXPECT_TRUE(wait_for("out/watch.jsonl"));
+    for (int i = 0; i < 3; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(150));
+      fs::remove(directory_ / "in/a.stl");
+      std::this_thread::sleep_for(std::chrono::milliseconds(150));
+      put_box("in/a.stl");
+    }
+    put_box("in/b.stl");
+    EXPECT_TRUE(wait_for("in/done/job.toml"));
+    ::kill(process, SIGTERM);
+  });
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(layers_of("out/job"), 2);
+}
+
+TEST_F(WatchedFolder, AJobFileStaysUntilAllItsPartsArePlanned) {
+  put_box("in/a.stl", 8);
+  write_text(directory_ / "in/a.obj",  // a tetrahedron of 0.1 mm
+             "v 0 0 0\nv 5 0 0\nv 0 5 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  write_text(directory_ / "in/a.toml", "[bed]\nsize_mm = [20, 20]\ndpi = 2400\n[layers]\nthickness_mm = 0.01\n");
+  const Outcome outcome = watch({"--jobs", "2"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(events("dropped").empty());
+  EXPECT_EQ(files_below(directory_ / "in"), (Words{"done/a.obj", "done/a.stl", "done/a.toml"}));
+  EXPECT_EQ(layers_of("out/a") + layers_of("out/a-2"), 810);
+}
+
 TEST_F(WatchedFolder, PartsWaitForAJobFileThatMayNameThem) {
   write_text(directory_ / "in/sub/job.toml", "");
   put_box("in/sub/a.stl");
@@ -220,6 +251,7 @@ TEST_F(WatchedFolder, PartsWaitForTheCorrectionOfTheirSettings) {
         {"with = \"jet -o x\"\n", "has -o"},
         {"with = \"jet --dip 3\"\n", "--dip"},
         {"output = \".\"\n", "is in the watched folder"},
+        {"", "in/sub/watch.toml: is empty or incomplete"},
         {"with = [\n", "in/sub/watch.toml:"}}) {
     write_text(directory_ / "in/sub/watch.toml", text);
     const Outcome outcome = watch({"--quiet"});
