@@ -20,7 +20,7 @@ using test::Directory;
 using test::read_text;
 using test::write_text;
 
-const std::atomic<bool> kGoOn{false};
+const std::atomic<bool> kNeverStops{false};
 
 std::shared_ptr<JobCache> open_in(const Directory& directory, bool link = false) {
   auto cache = JobCache::open(directory / "cache", link);
@@ -155,7 +155,7 @@ TEST(JobCacheStore, TrimsTheEntriesThatWereUsedLongestAgo) {
     ::utimensat(AT_FDCWD, (directory / ("cache/jobs/" + name.substr(0, 2) + "/" + name)).c_str(), times, 0);
   }
   static_cast<void>(file_of("z", 5'000));  // without an entry, young
-  const auto trimmed = trim_cache(*cache, 37'000, now, kGoOn);
+  const auto trimmed = trim_cache(*cache, 37'000, now, kNeverStops);
   ASSERT_TRUE(trimmed.ok());
   EXPECT_EQ(trimmed->entries, 2u);
   EXPECT_EQ(trimmed->objects, 2u);
@@ -164,7 +164,7 @@ TEST(JobCacheStore, TrimsTheEntriesThatWereUsedLongestAgo) {
   EXPECT_FALSE(cache->find({2, 2}));
   EXPECT_TRUE(cache->stream(shared.digest, {}).ok());
   EXPECT_EQ(cache->objects()->size(), 4u);
-  ASSERT_TRUE(trim_cache(*cache, UINT64_MAX, now + 4000, kGoOn).ok());
+  ASSERT_TRUE(trim_cache(*cache, UINT64_MAX, now + 4000, kNeverStops).ok());
   EXPECT_EQ(cache->objects()->size(), 3u);  // an hour later
   EXPECT_LE(measure_cache(*cache)->bytes, 37'000u);
 }
@@ -175,9 +175,9 @@ TEST(JobCacheStore, ChecksEntriesAndTheirObjects) {
   write_text(directory / "from", "bytes");
   const FileDigest digest = *cache->add_object(directory / "from");
   ASSERT_TRUE(cache->add({1, 1}, {{{"layers/000000.tif", digest}}, Json()}).ok());
-  EXPECT_TRUE(check_cache(*cache, kGoOn)->damaged.empty());
+  EXPECT_TRUE(check_cache(*cache, kNeverStops)->damaged.empty());
   write_text(only_file(directory, "objects"), "bytez");
-  EXPECT_EQ(check_cache(*cache, kGoOn)->damaged.size(), 2u);
+  EXPECT_EQ(check_cache(*cache, kNeverStops)->damaged.size(), 2u);
   EXPECT_TRUE(cache->entries()->empty());
   EXPECT_TRUE(cache->objects()->empty());
 }
