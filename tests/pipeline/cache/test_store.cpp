@@ -113,7 +113,7 @@ TEST(JobCacheStore, LinksAreReadOnlyAndChecked) {
   const Directory directory;
   const auto cache = open_in(directory, true);
   write_text(directory / "from", "bytes");
-  const FileDigest digest = *cache->add_object(directory / "from");
+  const FileDigest digest = *cache->add_object(directory / "from", {}, true);
   ASSERT_TRUE(cache->fetch(digest, directory / "to").ok());
   struct stat facts {};
   ASSERT_EQ(::stat((directory / "to").c_str(), &facts), 0);
