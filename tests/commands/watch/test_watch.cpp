@@ -199,14 +199,14 @@ TEST_F(WatchedFolder, APartThatIsRemovedIsWaitedForAgain) {
 
 TEST_F(WatchedFolder, AJobFileStaysUntilAllItsPartsArePlanned) {
   put_box("in/a.stl", 8);
-  write_text(directory_ / "in/a.obj",  // a tetrahedron of 0.1 mm
-             "v 0 0 0\nv 5 0 0\nv 0 5 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  write_text(directory_ / "in/a.obj",  // a tetrahedron of 2 mm, planned for longer than the folder is left unread
+             "v 0 0 0\nv 5 0 0\nv 0 5 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   write_text(directory_ / "in/a.toml", "[bed]\nsize_mm = [20, 20]\ndpi = 2400\n[layers]\nthickness_mm = 0.002\n");
   const Outcome outcome = watch({"--jobs", "2"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(events("dropped").empty());
   EXPECT_EQ(files_below(directory_ / "in"), (Words{"done/a.obj", "done/a.stl", "done/a.toml"}));
-  EXPECT_EQ(layers_of("out/a") + layers_of("out/a-2"), 4050);
+  EXPECT_EQ(layers_of("out/a") + layers_of("out/a-2"), 5000);
 }
 
 TEST_F(WatchedFolder, PartsWaitForAJobFileThatMayNameThem) {
