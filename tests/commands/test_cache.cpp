@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/cache/store.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -124,6 +125,26 @@ TEST_F(CachedJobs, DamageIsDetectedAndReplaced) {
       fs::remove_all(directory_ / output);
       fs::remove_all(directory_ / (output + "-again"));
     }
+  }
+}
+
+TEST_F(CachedJobs, AnEntryWithoutAllItsFilesIsNoHit) {
+  plain("jet part.stl --machine jet1000 --layer 0.5 -o plain");
+  run("jet part.stl --machine jet1000 --layer 0.5 -o first");
+  const auto cache = pipeline::JobCache::open(directory_ / "cache", false);
+  ASSERT_TRUE(cache.ok());
+  const auto entries = (*cache)->entries();
+  ASSERT_EQ(entries->size(), 1u);
+  const auto entry = (*cache)->inspect(entries->front().key);
+  ASSERT_TRUE(entry);
+  ASSERT_GT(entry->files.size(), 12u);  // 6 layers and programs, the frame of the program, the machine, the manifest
+  for (std::size_t i = 0; i < entry->files.size(); ++i) {
+    pipeline::CacheEntry less = *entry;
+    less.files.erase(less.files.begin() + static_cast<std::ptrdiff_t>(i));
+    ASSERT_TRUE((*cache)->add(entries->front().key, less).ok());
+    const std::string output = "out" + std::to_string(i);
+    EXPECT_EQ(run("jet part.stl --machine jet1000 --layer 0.5 -o " + output), "added") << entry->files[i].name;
+    expect_same(output, "plain");
   }
 }
 

@@ -38,7 +38,7 @@ TEST(Shares, WithoutLargeJobsTheLongestShareIsUpTo105PercentOfTheMean) {
   std::mt19937 random(7);
   int counted = 0;
   for (int round = 0; round < 300; ++round) {
-    const std::uint32_t parts = 1 + random() % 300, count = 1 + random() % 40;
+    const auto parts = static_cast<std::uint32_t>(1 + random() % 300), count = static_cast<std::uint32_t>(1 + random() % 40);
     const std::vector<CostedJob> jobs = random_jobs(random, 1 + random() % 4000, parts);
     const std::vector<std::uint32_t> shares = divide_jobs(jobs, count);
     const std::vector<std::uint64_t> sums = sums_of(jobs, shares, count);

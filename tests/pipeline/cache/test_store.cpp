@@ -191,6 +191,10 @@ TEST(JobCacheStore, ContinuesWithoutItsFolder) {
   const auto digest = cache->add_object(directory / "from");
   ASSERT_TRUE(digest.ok());
   EXPECT_TRUE(cache->fetch(*digest, directory / "to").ok());
+  EXPECT_TRUE(JobCache::open(directory / "cache", false).ok());
+  // Another process is removing the folder, and has removed its tag.
+  fs::remove(directory / "cache/CACHEDIR.TAG");
+  EXPECT_TRUE(JobCache::open(directory / "cache", false).ok());
 }
 
 TEST(JobCacheStore, ThreadsAddAndFetchTheSameObjects) {
