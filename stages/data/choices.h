@@ -14,6 +14,9 @@ constexpr unsigned bit(Product product) { return 1u << static_cast<unsigned>(pro
 /// What survives a power cut: nothing for certain, a job that has ended, or all but the layers in flight of one that runs.
 enum class Sync : std::uint8_t { kOff, kJob, kLayer };
 
+/// The files of a job: in a directory, or all in one ZIP file.
+enum class Container : std::uint8_t { kNone, kZip };
+
 /// The widest instructions that kernels use; auto: the processor's. The bytes are the same.
 enum class Isa : std::uint8_t { kAuto, kPlain, kAvx2, kAvx512 };
 

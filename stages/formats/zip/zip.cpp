@@ -37,6 +37,7 @@ Status deflate_onto(Deflated& out, std::string_view text) {
 
 namespace {
 
+constexpr std::uint64_t kDeflated = 8, kUtf8 = 1 << 11;                     // method; flag of names
 constexpr std::array<std::byte, 2> kLastBlock{std::byte{3}, std::byte{0}};  // of a deflate stream: final, fixed codes, empty
 
 void put_little(std::string& out, std::uint64_t number, int bytes) {
@@ -78,8 +79,8 @@ std::string ZipWriter::record(const Entry& entry, bool in_directory) const {
   std::string out = in_directory ? "PK\x01\x02" : "PK\x03\x04";
   if (in_directory) put_little(out, version, 2);  // made by
   put_little(out, version, 2);                    // needed to extract
-  put_little(out, 0, 2);
-  put_little(out, 8, 2);  // deflated
+  put_little(out, std::ranges::any_of(entry.name, [](char c) { return c < 0; }) ? kUtf8 : 0, 2);
+  put_little(out, entry.stored ? 0 : kDeflated, 2);
   put_little(out, date_, 4);
   put_little(out, entry.crc, 4);
   put_little(out, large_sizes ? UINT32_MAX : entry.packed, 4);
@@ -108,6 +109,24 @@ Status ZipWriter::add(std::string_view name, std::span<const Deflated> pieces) {
   written_ += head.size() + entry.packed;
   entries_.push_back(std::move(entry));
   return file_.append(kLastBlock);
+}
+
+std::uint32_t crc_of(std::span<const std::byte> bytes) {
+  return static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+Status ZipWriter::store(std::string_view name, std::span<const std::byte> bytes, std::uint32_t crc) {
+  Entry entry{std::string(name), crc, bytes.size(), bytes.size(), written_, true};
+  const std::string head = record(entry, false);
+  if (Status status = file_.append(head); !status) return status;
+  written_ += head.size() + bytes.size();
+  entries_.push_back(std::move(entry));
+  return file_.append(bytes);
+}
+
+void ZipWriter::keep(const ContainerEntry& entry, std::uint64_t end) {
+  entries_.push_back({entry.name, entry.crc, entry.bytes, entry.bytes, entry.header, true});
+  written_ = end;
 }
 
 Status ZipWriter::finish() {

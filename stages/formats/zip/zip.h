@@ -1,4 +1,4 @@
-// stages/formats/zip/zip.h: a ZIP archive of deflated entries, written from front to back.
+// stages/formats/zip/zip.h: a ZIP archive of deflated or stored entries, written from front to back.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
+#include "stages/support/io/container.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::formats {
@@ -36,6 +37,9 @@ inline constexpr ZipDate kFirstZipDate = (1u << 5 | 1u) << 16;  // 1 January 198
 /// source  https://reproducible-builds.org/specs/source-date-epoch/
 Result<ZipDate> zip_date(const char* text);
 
+/// The CRC-32 of an entry. cost  1 ns a byte
+std::uint32_t crc_of(std::span<const std::byte> bytes);
+
 /// Sizes and sums are before the data of an entry, so that readers need not search for its end.
 ///
 /// source  PKWARE, APPNOTE.TXT 6.3.10, sections 4.3 and 4.5.3
@@ -48,6 +52,11 @@ class ZipWriter {
 
   /// Writes an entry of pieces that follow each other. errors  kOutput
   Status add(std::string_view name, std::span<const Deflated> pieces);
+  /// Writes an entry as it is, without compression. crc  as of crc_of(). errors  kOutput
+  Status store(std::string_view name, std::span<const std::byte> bytes, std::uint32_t crc);
+  /// Adds an entry that the file already has, stored at that place. Before the first other one, in the order of the file.
+  /// end  the offset behind it
+  void keep(const ContainerEntry& entry, std::uint64_t end);
   /// Writes the directory of entries. errors  kOutput
   Status finish();
 
@@ -56,6 +65,7 @@ class ZipWriter {
     std::string name;
     std::uint32_t crc;
     std::uint64_t packed, size, position;
+    bool stored = false;
   };
   bool large(std::uint64_t number) const { return number >= zip64_from_; }
   std::string record(const Entry& entry, bool in_directory) const;

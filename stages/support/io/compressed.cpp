@@ -47,7 +47,8 @@ Error content_beyond(const std::string& path, std::uint64_t bytes) {
 }  // namespace
 
 struct ContentWriter::State {
-  std::optional<File> file;
+  std::optional<File> file;  // nothing: the bytes go to `memory`
+  Buffer<std::byte> memory;
   bool compresses = false;
   std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context{nullptr, ZSTD_freeCCtx};
   std::vector<std::byte> out;
@@ -55,6 +56,9 @@ struct ContentWriter::State {
   HashState hash = make_content_hash();
   std::uint64_t content = 0, stored = 0;
 
+  Status begin(bool compressed);
+  Status write(std::span<const std::byte> bytes);
+  std::uint64_t written() const { return file ? file->size() : memory.size(); }
   Status compress(std::span<const std::byte> bytes, ZSTD_EndDirective end);
   Status put();
   Status end_frame();
@@ -62,12 +66,18 @@ struct ContentWriter::State {
 
 /// Writes what there is of the frame. Its first piece begins after a gap, so that its head has space for the content's size.
 Status ContentWriter::State::put() {
-  if (file->size() == 0) {
+  if (written() == 0) {
     std::memmove(out.data(), out.data() + kSizeBytes, kSizeOffset);
     out[kDescriptor] |= std::byte{kSizeOfEightBytes};
     std::memcpy(out.data() + kSizeOffset, &content, kSizeBytes);
   }
-  return file->append(std::span(out.data(), std::exchange(filled, 0)));
+  return write(std::span(out.data(), std::exchange(filled, 0)));
+}
+
+Status ContentWriter::State::write(std::span<const std::byte> bytes) {
+  if (file) return file->append(bytes);
+  memory.insert(memory.end(), bytes.begin(), bytes.end());
+  return {};
 }
 
 Status ContentWriter::State::compress(std::span<const std::byte> bytes, ZSTD_EndDirective end) {
@@ -84,9 +94,13 @@ Status ContentWriter::State::compress(std::span<const std::byte> bytes, ZSTD_End
 
 Status ContentWriter::State::end_frame() {
   if (Status status = compress({}, ZSTD_e_end); !status) return status;
-  const bool begun = file->size() > 0;
+  const bool begun = written() > 0;
   const Status status = put();
-  return status && begun ? file->overwrite(kSizeOffset, std::as_bytes(std::span(&content, 1))) : status;
+  const auto size = std::as_bytes(std::span(&content, 1));
+  if (!status || !begun) return status;
+  if (file) return file->overwrite(kSizeOffset, size);
+  std::ranges::copy(size, memory.begin() + kSizeOffset);
+  return {};
 }
 
 ContentWriter::ContentWriter() : state_(std::make_unique<State>()) {}
@@ -100,6 +114,12 @@ Status ContentWriter::open(const std::string& path, const FileOptions& options) 
 
 Status ContentWriter::open_nowhere(bool compressed) { return begin("/dev/null", {.stream = true}, compressed); }
 
+Status ContentWriter::open_in_memory(bool compressed) {
+  state_->file.reset();
+  state_->memory.clear();
+  return state_->begin(compressed);
+}
+
 Status ContentWriter::begin(const std::string& path, const FileOptions& options, bool compressed) {
   State& state = *state_;
   FileOptions how = options;
@@ -108,21 +128,25 @@ Status ContentWriter::begin(const std::string& path, const FileOptions& options,
   auto file = File::open(path, how);
   if (!file) return file.error();
   state.file.emplace(std::move(*file));
-  state.content = 0;
-  XXH3_128bits_reset(state.hash.get());
-  state.compresses = compressed;
-  if (!state.compresses) return {};
-  state.filled = kSizeBytes;
-  if (state.context) {
-    ZSTD_CCtx_reset(state.context.get(), ZSTD_reset_session_only);
+  return state.begin(compressed);
+}
+
+Status ContentWriter::State::begin(bool compressed) {
+  content = 0;
+  XXH3_128bits_reset(hash.get());
+  compresses = compressed;
+  if (!compresses) return {};
+  filled = kSizeBytes;
+  if (context) {
+    ZSTD_CCtx_reset(context.get(), ZSTD_reset_session_only);
     return {};
   }
-  state.context.reset(ZSTD_createCCtx());
-  if (!state.context) return out_of_memory();
-  ZSTD_CCtx_setParameter(state.context.get(), ZSTD_c_compressionLevel, kLevel);
-  ZSTD_CCtx_setParameter(state.context.get(), ZSTD_c_windowLog, kWindowLog);
-  ZSTD_CCtx_setParameter(state.context.get(), ZSTD_c_contentSizeFlag, 0);
-  state.out.resize(kContentPiece);
+  context.reset(ZSTD_createCCtx());
+  if (!context) return out_of_memory();
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_windowLog, kWindowLog);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_contentSizeFlag, 0);
+  out.resize(kContentPiece);
   return {};
 }
 
@@ -133,7 +157,7 @@ Status ContentWriter::append(std::span<const std::byte> bytes) {
     const auto piece = bytes.first(std::min(bytes.size(), kCachedPiece));
     bytes = bytes.subspan(piece.size());
     XXH3_128bits_update(state.hash.get(), piece.data(), piece.size());
-    const Status status = state.compresses ? state.compress(piece, ZSTD_e_continue) : state.file->append(piece);
+    const Status status = state.compresses ? state.compress(piece, ZSTD_e_continue) : state.write(piece);
     if (!status) return status;
   }
   return {};
@@ -144,17 +168,21 @@ Result<FileDigest> ContentWriter::finish() {
   if (state.compresses) {
     if (Status status = state.end_frame(); !status) return status.error();
   }
-  state.stored = state.file->size();
-  const auto written = state.file->finish();
-  state.file.reset();
-  if (!written) return written.error();
+  state.stored = state.written();
+  if (state.file) {
+    const auto written = state.file->finish();
+    state.file.reset();
+    if (!written) return written.error();
+  }
   return FileDigest{state.content, content_hash(state.hash)};
 }
 
 std::uint64_t ContentWriter::stored_bytes() const { return state_->stored; }
 
+std::span<const std::byte> ContentWriter::stored() const { return state_->memory; }
+
 std::uint64_t ContentWriter::bytes() const {
-  return state_->out.capacity() + (state_->context ? ZSTD_sizeof_CCtx(state_->context.get()) : 0);
+  return bytes_held(state_->memory) + state_->out.capacity() + (state_->context ? ZSTD_sizeof_CCtx(state_->context.get()) : 0);
 }
 
 Status write_content(const std::string& path, std::span<const std::byte> content, const FileOptions& options) {

@@ -37,12 +37,16 @@ class ContentWriter {
   Status open(const std::string& path, const FileOptions& options);
   /// Begins a content that is only measured.
   Status open_nowhere(bool compressed);
+  /// Begins a content that is kept in memory, for stored().
+  Status open_in_memory(bool compressed);
   /// errors  of File::append; kMemory
   Status append(std::span<const std::byte> bytes);
   /// Gives the file its name. returns  the size and the hash of the content
   Result<FileDigest> finish();
   /// Of the last finished file.
   std::uint64_t stored_bytes() const;
+  /// Its bytes, if it is in memory; valid until the next one begins.
+  std::span<const std::byte> stored() const;
 
   /// Of its buffers, now and at most.
   std::uint64_t bytes() const;

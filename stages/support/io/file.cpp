@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "stages/data/shortage.h"
+#include "stages/support/io/container.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/rename.h"
 #include "stages/support/io/sync.h"
@@ -373,7 +374,8 @@ bool same_file(const std::string& a, const std::string& b) {
 
 bool is_file(const std::string& path) {
   struct stat status {};
-  return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+  if (::stat(path.c_str(), &status) == 0) return S_ISREG(status.st_mode);
+  return errno == ENOTDIR && entry_bytes(path).has_value();
 }
 
 bool is_stream(const std::string& path) {
@@ -417,15 +419,24 @@ Status check_plain(const std::string& file, std::optional<std::uint64_t> bytes) 
   };
   std::error_code error;
   const fs::file_status status = fs::symlink_status(file, error);
-  if (!fs::is_regular_file(status)) return refuse(fs::exists(status) ? "is a link or a device, not a file" : "is missing");
+  const std::optional<std::uint64_t> entry = fs::exists(status) ? std::nullopt : entry_bytes(file);
+  if (!entry && !fs::is_regular_file(status))
+    return refuse(fs::exists(status) ? "is a link or a device, not a file" : "is missing");
   if (!bytes) return {};
-  const std::uintmax_t size = fs::file_size(file, error);
+  if (entry) error.clear();
+  const std::uintmax_t size = entry ? *entry : fs::file_size(file, error);
   if (error) return refuse("is missing");
   return size == *bytes ? Status() : Status(refuse(fmt::format("{} bytes, the manifest says {}", size, *bytes)));
 }
 
 Result<bool> bring_file(const std::string& from, const std::string& to) {
   namespace fs = std::filesystem;
+  if (entry_bytes(from)) {
+    const auto content = read_file(from, {});
+    if (!content) return content.error();
+    const Status written = write_file(to, *content, {.lock = false, .follow = false, .durable = Durable::kNo});
+    return written ? Result<bool>(false) : written.error();
+  }
   const std::string fresh = temporary_name(to);
   const int watched = watch(fresh.c_str());
   std::error_code error;

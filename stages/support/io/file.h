@@ -122,7 +122,7 @@ std::optional<FileId> file_id(const std::string& path);
 /// Whether two names lead to the same file or directory, by device and inode; false if one of them is absent.
 bool same_file(const std::string& a, const std::string& b);
 
-/// Whether the name leads to a regular file.
+/// Whether the name leads to a regular file, or through a container to an entry.
 bool is_file(const std::string& path);
 
 /// Whether the name leads to a device, a pipe or a socket, or is "-", standard output.
@@ -146,10 +146,8 @@ bool is_replaceable(const std::string& path, std::span<const std::string_view> m
 /// errors  kVerification: missing, no plain file, of another size
 Status check_plain(const std::string& file, std::optional<std::uint64_t> bytes = {});
 
-/// Links a file to another name, or copies it to another file system. The name appears once the file is whole; what had it is
-/// replaced.
-/// returns  whether it is a link
-/// errors   kOutput
+/// Links a file to another name, or copies it to another file system or out of a container. The name appears once the file is
+/// whole; what had it is replaced. returns  whether it is a link errors   kOutput
 Result<bool> bring_file(const std::string& from, const std::string& to);
 
 }  // namespace lamina

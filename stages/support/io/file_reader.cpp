@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "stages/data/shortage.h"
+#include "stages/support/io/container.h"
 
 namespace lamina {
 namespace {
@@ -127,6 +128,11 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
   } else {
     // Without O_NONBLOCK, opening a pipe without a writer would wait for ever.
     state->file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
+  }
+  if (state->file < 0 && errno == ENOTDIR) {
+    OpenedEntry entry = open_entry(path);
+    if (!entry.fault.empty()) return state->error(entry.fault);
+    state->file = entry.file;
   }
   struct stat status {};
   if (state->file < 0 || ::fstat(state->file, &status) != 0) {

@@ -1,0 +1,50 @@
+// stages/support/io/container.h: reads the files of a job that are in one ZIP file.
+//
+// A path may lead through a container: out.zip/layers/000042.tif is the entry layers/000042.tif of the file out.zip. Entries
+// are stored as they are, without compression. An unfinished container, out.zip.part, has no directory of entries yet: its
+// entries are those that are whole. source  PKWARE, APPNOTE.TXT 6.3.10, sections 4.3 and 4.5.3
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+
+namespace lamina {
+
+struct ContainerEntry {
+  std::string name;  // with its folders, as in layers/000042.tif
+  std::uint32_t crc = 0;
+  std::uint64_t bytes = 0, header = 0;  // header: its offset in the file
+};
+
+/// The entries of a container, in the order of the file; of NAME.part those that are whole, from the first on.
+/// end     unless null: the offset behind the last whole entry
+/// errors  kVerification: cannot be read, no ZIP file, damaged, entries that are compressed
+/// cost    a few reads of the directory; of NAME.part two for each entry
+Result<std::vector<ContainerEntry>> read_entries(const std::string& path, std::uint64_t* end = nullptr);
+
+/// Whether a regular file begins like a container, and has the manifest of a job or is unfinished.
+bool is_container(const std::string& path);
+
+/// Whether a directory or a container is there.
+bool is_job_folder(const std::string& path);
+
+/// A descriptor of the bytes of an entry alone.
+struct OpenedEntry {
+  int file = -1;      // owned by the caller; -1: none
+  std::string fault;  // of the container; "": errno states why there is no descriptor, ENOENT for no such entry
+};
+/// The container is read again once its file has changed.
+/// cost  copies the entry into memory
+OpenedEntry open_entry(const std::string& path);
+
+/// Whether a path leads through a container to an entry; its size. cost  some system calls
+std::optional<std::uint64_t> entry_bytes(const std::string& path);
+
+/// The names in a folder, of a directory or a container, without order; empty if there is none. Of a container files alone.
+std::vector<std::string> names_in_folder(const std::string& folder);
+
+}  // namespace lamina
