@@ -60,6 +60,7 @@ std::string why_not(const Resolved& resolved) {
   if (resolved.product == Product::kContours) return "contours are not cached";
   if (resolved.product == Product::kMoves && resolved.extruder->machine.format == "sml") return "SML has a second file";
   if (resolved.product == Product::kMoves && is_stream(job.output)) return "the output is a stream";
+  if (job.container != Container::kNone) return "its files are in a container";
   for (const PartRequest& part : job.parts) {
     if (!load::is_part_name(part.path)) return part.path + " is not an STL, OBJ or 3MF file";
   }

@@ -86,8 +86,7 @@ Status check_frame(const std::string& directory, const ManifestHead& head) {
 
 Result<std::string> program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
   const std::string path = (fs::path(directory) / program_file_name(record.layer.index, head.program_extension)).string();
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return wrong(path, "is missing");
+  if (!is_file(path)) return wrong(path, "is missing");
   auto text = read_content(path, record.program.bytes);
   if (!text) return Error{Fault::kVerification, text.error().message + "; run lamina verify for details"};
   if (text->size() != record.program.bytes || hash_text(*text) != record.program.hash) return changed(path);
@@ -115,8 +114,8 @@ std::uint64_t bytes_to_make(const ManifestHead& head, const LayerRecord& record)
   return 4 * bytes_to_read(head, record);  // with the zones of drops, and what the shell of a core takes to be found
 }
 
-Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops,
-                                        Levels& levels, Keep keep) {
+Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels,
+                                        Keep keep) {
   const bool grey = head.grey_drops() || head.full_level() > 0;
   if (!grey) return formats::image(path, 0, keep);
   auto image = formats::levels(path, head.full_level(), levels);
@@ -157,8 +156,7 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
     const Status added = add_picture(head, i, std::move(image->runs), std::move(drops), picture);
     if (!added) return wrong(path, "sets pixels that " + added.error().message);
   }
-  if (Status status = expected.apply(record.layer, picture.planes); !status)
-    return wrong(directory, status.error().message);
+  if (Status status = expected.apply(record.layer, picture.planes); !status) return wrong(directory, status.error().message);
   return std::move(picture.planes);
 }
 

@@ -25,8 +25,9 @@
 #include "stages/formats/images/image.h"
 #include "stages/replay/frame.h"
 #include "stages/replay/totals.h"
-#include "stages/support/io/compressed.h"
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/compressed.h"
+#include "stages/support/io/container.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/memory_gate.h"
 
@@ -116,8 +117,7 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
   const std::string path = (fs::path(inspection.directory) / name).string();
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
+  if (!is_file(path)) return fmt::format("{}: is missing", name);
   bool same = false;
   const auto expands_to = [&](std::uint64_t bytes) {
     return fmt::format("{}: expands to {} bytes, the manifest says {}", name, bytes, record.program.bytes);
@@ -133,8 +133,8 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
     if (is_compressed(name) && text.size() != record.program.bytes) return expands_to(text.size());
     same = text.size() == record.program.bytes && hash_text(text) == record.program.hash;
     const auto replay_by = found.by_drops ? &replay::VirtualMachine::replay_drops : &replay::VirtualMachine::replay_words;
-    const auto replay = (*inspection.machine.*replay_by)(text, record.layer, drops->planes(), record.program.moved,
-                                                         record.program.lost);
+    const auto replay =
+        (*inspection.machine.*replay_by)(text, record.layer, drops->planes(), record.program.moved, record.program.lost);
     if (!replay) {
       found.repeat = !found.by_drops;
       return fmt::format("{}: {}", name, replay.error().message);
@@ -193,7 +193,8 @@ std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, 
 
 std::string fault_of_layer(const Verification& inspection, const LayerRecord& record, LayerScratch& scratch, Finding& found) {
   auto& [text, drops] = scratch;
-  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, text, found);  // a format without files
+  if (inspection.head.extension.empty())
+    return fault_of_program(inspection, record, nullptr, text, found);  // a format without files
   raster::DropPlanes picture = planes_of(inspection.head);
   std::uint64_t levels = 0;
   const auto files = layer_images(inspection.head, record);
@@ -260,15 +261,15 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
 }
 
 /// Finds the faults of layers, as many at a time as the memory admits; those that are to be replayed drop by drop once more.
-void inspect_layers(const Verification& inspection, std::span<const LayerRecord> records, MemoryGate& gate,
-                    ScratchPool& pool, std::vector<Finding>& found) {
+void inspect_layers(const Verification& inspection, std::span<const LayerRecord> records, MemoryGate& gate, ScratchPool& pool,
+                    std::vector<Finding>& found) {
   const ManifestHead& head = inspection.head;
   const bool quick = inspection.options.quick;
   const replay::VirtualMachine* machine = quick || !inspection.machine ? nullptr : &*inspection.machine;
   const std::uint32_t planes = std::max(1u, head.max_drops);
   const auto inspect = [&](std::size_t i, std::uint64_t replay_bytes) {
-    const std::uint64_t images = inspection.expected.remakes() ? bytes_to_make(head, records[i])
-                                                               : bytes_to_read(head, records[i], inspection.keep());
+    const std::uint64_t images =
+        inspection.expected.remakes() ? bytes_to_make(head, records[i]) : bytes_to_read(head, records[i], inspection.keep());
     const std::uint64_t text = machine != nullptr ? 2 * records[i].program.bytes : 0;  // while it grows
     const auto pass = gate.enter(quick ? 0 : images + text + replay_bytes);
     found[i].count.reset();
@@ -419,8 +420,8 @@ Result<VerifyReport> verify_file(const std::string& path, const VerifyOptions& o
 
 Result<VerifyReport> verify_any(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
-  if (fs::is_regular_file(directory, error)) return verify_file(directory, options);
-  if (!fs::is_directory(directory, error)) {
+  if (!is_container(directory) && fs::is_regular_file(directory, error)) return verify_file(directory, options);
+  if (!is_job_folder(directory)) {
     return Error{Fault::kUsage, fmt::format("{}: no such directory or file; name what lamina jet, lamina slice or lamina "
                                             "extrude wrote",
                                             directory)};

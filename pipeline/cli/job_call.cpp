@@ -154,6 +154,18 @@ CommandLine unpacked(const BatchJob& job) {
   return line;
 }
 
+/// The word of --container, of an assignment or of the job file; the last one counts.
+std::string container_of(const Arguments& arguments, const Job& planned) {
+  if (arguments.has("--container")) return arguments.text("--container");
+  constexpr std::string_view kAssigned = "run.container=";
+  std::string word = planned.container == Container::kZip ? "zip" : "";
+  for (const std::string& assignment : arguments.all("--set")) {
+    if (assignment.starts_with(kAssigned)) word = assignment.substr(kAssigned.size());
+  }
+  std::erase(word, '"');
+  return word;
+}
+
 }  // namespace
 
 Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments, Context& context) {
@@ -169,6 +181,19 @@ Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments, Context
   return std::shared_ptr<JobCache>();
 }
 
+void add_container(std::vector<BatchEntry>& entries, const std::string& kind) {
+  constexpr const char* kOption = "--container";
+  for (BatchEntry& entry : entries) {
+    if (kind.empty()) return;
+    std::vector<std::string> words = entry.words.unpacked();
+    const Command* const command = words.empty() ? nullptr : find_command(words.front());
+    if (command == nullptr || command->reads_itself || spec_for(*command).find(kOption) == nullptr) continue;
+    if (std::ranges::any_of(words, [&](const std::string& word) { return word.starts_with(kOption); })) continue;
+    words.insert(words.begin() + 1, {kOption, kind});
+    entry.words = words;
+  }
+}
+
 Result<Call> read_call(const std::vector<std::string>& words) {
   const Result<CommandLine> line = read_command_line(words);
   if (!line) return line.error();
@@ -180,12 +205,17 @@ Result<Call> read_call(const std::vector<std::string>& words) {
     if (Status status = read_job(read->text("--job"), planned); !status) return status.error();
   }
 
+  const std::string container = spec.find("--container") != nullptr ? container_of(*read, planned) : std::string();
   Call call;
   if (const OptionSpec* option = spec.find("--output"); option != nullptr && !read->has("--dry-run")) {
     call.output_of_job_file = !read->has(option->flag);
     call.output = call.output_of_job_file ? planned.output : read->text(option->flag);
     if (command->ending != nullptr) call.ending = command->ending(*read);
     if (!call.ending && option->value.find("DIR") != std::string::npos) call.ending = "";
+    if (container == "zip") {
+      call.output = output_of(std::move(call.output), Container::kZip);
+      call.ending = ".zip";
+    }
   }
   call.can_continue = spec.find("--resume") != nullptr && !read->has("--resume");
   call.can_replace = spec.find("--overwrite") != nullptr && !read->has("--overwrite") && !read->has("--resume");
@@ -193,8 +223,8 @@ Result<Call> read_call(const std::vector<std::string>& words) {
     call.layer_bytes = 0;
     if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
   }
-  const bool sets_sync = std::ranges::any_of(
-      read->all("--set"), [](const std::string& assignment) { return assignment.starts_with("run.sync"); });
+  const bool sets_sync =
+      std::ranges::any_of(read->all("--set"), [](const std::string& assignment) { return assignment.starts_with("run.sync"); });
   call.names_sync = read->has("--sync") || is_named(planned, "run.sync") || sets_sync || spec.find("--sync") == nullptr;
   if (spec.find("--layer") != nullptr) {
     call.layer_mm = planned.layer_mm;

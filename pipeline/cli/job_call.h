@@ -18,6 +18,9 @@ class JobCache;  // pipeline/cache/store.h
 /// errors  kUsage: the folder is no cache, or in the output; --cache-link alone
 Result<std::shared_ptr<JobCache>> open_cache(const Arguments& arguments, Context& context);
 
+/// Adds --container to the words of jobs that accept it and do not name one. kind  "": none is added
+void add_container(std::vector<BatchEntry>& entries, const std::string& kind);
+
 /// Reads a command line of at least one word: any command but batch, watch and preview.
 /// errors  kUsage: no such command, wrong arguments, a job file that cannot be read
 Result<Call> read_call(const std::vector<std::string>& words);

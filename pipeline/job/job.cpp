@@ -78,9 +78,24 @@ Status check_job(const Job& job) {
   if (job.layers && job.shard) return usage("--layers and --shard exclude each other; a shard is a share of all layers");
   if (job.resume && job.overwrite)
     return usage("--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces");
+  if (job.container != Container::kNone) {
+    if ((job.layers || job.shard) && job.inspect)
+      return usage(
+          "--container: sections that --inspect keeps of some layers need a directory; inspect all layers, or remove it");
+    if (output_of(job.output, job.container) != job.output)
+      return usage("-o {}: a container is a ZIP file; end its name with .zip", job.output);
+  }
   if (job.output.empty() && !job.dry_run)
     return usage("-o DIR is missing; name the directory for the layers, or use --dry-run");
   return {};
+}
+
+constexpr std::string_view kContainerEnd = ".zip";
+
+std::string output_of(std::string output, Container container) {
+  if (container == Container::kNone || output.empty() || output.ends_with(kContainerEnd)) return output;
+  while (output.size() > 1 && output.ends_with('/')) output.pop_back();
+  return output += kContainerEnd;
 }
 
 Result<heights::Options> heights_options(const Job& job) { return heights::options_of(job.heights, job.layer_mm); }

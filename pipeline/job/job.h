@@ -80,12 +80,12 @@ struct ExtrudeRequest {
   std::optional<bool> relative_extrusion;
   std::optional<std::uint32_t> skirt_loops;
   // --- of the first layer
-  double brim_mm = 0;                                        // width of loops around the parts
-  double elephant_foot_mm = 0;                               // by which contours are moved inwards
-  std::optional<double> first_thickness_mm, first_bead_mm;   // absent: as in the others
+  double brim_mm = 0;                                       // width of loops around the parts
+  double elephant_foot_mm = 0;                              // by which contours are moved inwards
+  std::optional<double> first_thickness_mm, first_bead_mm;  // absent: as in the others
   // --- of layers under the parts; with some, the settings of the first layer are those of the raft's
   std::uint32_t raft_layers = 0;
-  double raft_gap_mm = 0.1, raft_margin_mm = 3;  // up to the parts; around them
+  double raft_gap_mm = 0.1, raft_margin_mm = 3;              // up to the parts; around them
   std::string material;                                      // name of a material, or a file; empty: the printer's
   std::vector<std::pair<std::string, std::string>> machine;  // other profile keys with values: fan.from_layer, 2
 };
@@ -194,6 +194,7 @@ struct Job {
   std::uint32_t threads = 0;                           // 0: all of the host
   std::uint64_t memory_bytes = 1ull << 30;             // budget of the layers in flight
   Sync sync = Sync::kJob;                              // what survives a power cut
+  Container container = Container::kNone;              // of images; output is the name of its file
   std::optional<std::array<std::uint32_t, 2>> layers;  // [first, last) only
   std::optional<std::array<std::uint32_t, 2>> shard;   // i of n, i from 0
   bool resume = false;
@@ -219,6 +220,9 @@ struct Job {
 /// Checks every value of a job against its limits and against the others; for jobs from any source.
 /// errors  kUsage, one line that begins with the key
 Status check_job(const Job& job);
+
+/// The name of a job's output: with a container, DIR becomes DIR.zip.
+std::string output_of(std::string output, Container container);
 
 /// Section [heights] as checked options of the stage. errors  kUsage, one line that begins with the key
 Result<heights::Options> heights_options(const Job& job);

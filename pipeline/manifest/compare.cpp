@@ -105,8 +105,7 @@ std::string in_directory(const std::string& message, const std::string& path, co
 std::string fault_of_file(const std::string& directory, const std::string& name, const Hash128& hash,
                           std::optional<std::uint64_t> bytes) {
   const std::string path = (fs::path(directory) / name).string();
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
+  if (!is_file(path)) return fmt::format("{}: is missing", name);
   const Result<FileDigest> digest = digest_content(path, bytes);
   if (!digest) return in_directory(digest.error().message, path, name);
   if (bytes && digest->bytes != *bytes) return fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, *bytes);

@@ -51,11 +51,15 @@ Status check_inspection_file(const std::string& directory) {
                            path)};
 }
 
-Status write_inspection(const std::string& directory, const ManifestHead& head, const Json& facts) {
-  if (Status status = check_inspection_file(directory); !status) return status;
+std::string inspection_text(const ManifestHead& head, const Json& facts) {
   Json json{{"lamina", head.version}, {"kind", "inspection"}, {"job", hex(head.id())}};
   json.update(facts);
-  const std::string text = json_line(json);
+  return json_line(json);
+}
+
+Status write_inspection(const std::string& directory, const ManifestHead& head, const Json& facts) {
+  if (Status status = check_inspection_file(directory); !status) return status;
+  const std::string text = inspection_text(head, facts);
   return write_file(inspection_path(directory), std::string_view(text));
 }
 

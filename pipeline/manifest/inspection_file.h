@@ -19,6 +19,9 @@ std::string inspection_path(const std::string& directory);
 /// errors  kUsage: a file of that name is not lamina's own
 Status check_inspection_file(const std::string& directory);
 
+/// The text of the file. facts  an object whose keys follow those of the job
+std::string inspection_text(const ManifestHead& head, const Json& facts);
+
 /// facts  an object whose keys follow those of the job. errors  kUsage, kOutput
 Status write_inspection(const std::string& directory, const ManifestHead& head, const Json& facts);
 

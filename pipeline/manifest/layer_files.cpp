@@ -10,6 +10,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/program/dialect.h"
 #include "stages/support/io/compressed.h"
+#include "stages/support/io/container.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/number_text.h"
 
@@ -92,10 +93,10 @@ bool lies_in_job(const std::string& file, const std::string& directory) {
 
 std::vector<ManifestFile> find_manifests(const std::string& directory) {
   std::vector<ManifestFile> found;
-  for_each_entry(directory, [&](const fs::directory_entry& entry) {
+  for (const std::string& name : names_in_folder(directory)) {
     ManifestFile file;
-    if (is_manifest(entry.path().filename().string(), file)) found.push_back(std::move(file));
-  });
+    if (is_manifest(name, file)) found.push_back(std::move(file));
+  }
   constexpr std::array<std::uint32_t, 2> kWhole{};
   std::sort(found.begin(), found.end(), [&](const ManifestFile& a, const ManifestFile& b) {
     const auto [a_index, a_count] = a.shard.value_or(kWhole);

@@ -187,6 +187,14 @@ struct ManifestWriter::State {
     if (Status status = file.flush(); !status) return status;
     return syncs ? file.sync() : Status();
   }
+
+  /// Appends what follows the last layer.
+  Status close(const FileDigest& digest) {
+    if (next_layer != head.last_layer)
+      return Error{Fault::kInternal, fmt::format("manifest: closed at layer {} of {}", next_layer, head.last_layer)};
+    buffer += tail_text(head, digest);
+    return flush();
+  }
 };
 
 ManifestWriter::ManifestWriter() = default;
@@ -250,14 +258,18 @@ Status ManifestWriter::flush() { return state_->flush(); }
 
 Status ManifestWriter::finish(const FileDigest& file, const std::function<Status()>& names) {
   State& state = *state_;
-  if (state.next_layer != state.head.last_layer) {
-    return Error{Fault::kInternal, fmt::format("manifest: closed at layer {} of {}", state.next_layer, state.head.last_layer)};
-  }
-  state.buffer += tail_text(state.head, file);
-  if (Status status = state.flush(); !status) return status;
+  if (Status status = state.close(file); !status) return status;
   if (Status status = names ? names() : Status(); !status) return status;
   const auto whole = state.file.finish();
   return whole ? Status() : Status(whole.error());
+}
+
+Status ManifestWriter::finish_elsewhere(const std::function<Status()>& take) {
+  State& state = *state_;
+  if (Status status = state.close({}); !status) return status;
+  if (Status status = take(); !status) return status;
+  state.file.discard();
+  return {};
 }
 
 void ManifestWriter::discard() { state_->file.discard(); }

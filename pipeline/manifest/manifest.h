@@ -188,6 +188,9 @@ class ManifestWriter {
   /// names  once all that needs space is written, before the name is taken: removes what an earlier job left, gives the
   ///        other files their names. After a failure or a kill in it the record of all layers stands as `path`.part
   Status finish(const FileDigest& file = {}, const std::function<Status()>& names = {});
+  /// Closes the JSON in `path`.part, of which `take` keeps a copy elsewhere; then removes it. After a failure or a kill in
+  /// it the record of all layers is there still.
+  Status finish_elsewhere(const std::function<Status()>& take);
   /// Removes the started file.
   void discard();
 

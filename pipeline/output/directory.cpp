@@ -17,6 +17,7 @@
 #include "stages/data/shortage.h"
 #include "stages/support/hash/hash.h"
 #include "stages/support/io/compressed.h"
+#include "stages/support/io/container.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
@@ -208,10 +209,8 @@ bool writes(const LayersOfJob& job, const fs::path& name) {
 std::vector<std::string> stray_files(const std::string& directory, std::span<const LayersOfJob> jobs) {
   std::vector<std::string> strays;
   for (const char* folder : {"layers", "program"}) {
-    std::error_code error;
-    for (fs::directory_iterator entry(fs::path(directory) / folder, error), end; !error && entry != end;
-         entry.increment(error)) {
-      const fs::path name = folder / entry->path().filename();
+    for (const std::string& file : names_in_folder((fs::path(directory) / folder).string())) {
+      const fs::path name = fs::path(folder) / file;
       if (std::ranges::none_of(jobs, [&](const LayersOfJob& job) { return writes(job, name); }))
         strays.push_back(name.generic_string());
     }
@@ -237,10 +236,10 @@ FileOptions layer_file_options(const Job& job) {
   return {.lock = false, .follow = false, .durable = job.sync == Sync::kLayer ? Durable::kBytes : Durable::kNo};
 }
 
-Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
+Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& finished,
                                                   const ManifestHead& head) {
-  std::string path = directory + "/" + manifest_name;
-  if (::access(path.c_str(), F_OK) != 0) {
+  std::string path = finished;
+  if (!is_file(path)) {
     path += ".part";
     if (!has_manifest_head(path)) return std::vector<LayerRecord>{};
   }

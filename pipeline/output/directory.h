@@ -66,12 +66,14 @@ FileOptions layer_file_options(const Job& job);
 
 // --- finds the intact layers of an interrupted job.
 
-/// Reads the manifest of `directory` (finished or partial) and hashes the files it names.
+/// Reads a manifest (finished or partial) and hashes the files it names.
 ///
+/// directory  of the files; a container too
+/// finished   path of the finished manifest
 /// returns  the records, in layer order, of complete and unchanged files; empty without a manifest
 /// errors   kUsage if the manifest belongs to another job (names the key that differs) or covers layers outside this run
 /// cost     reads every finished file once, in parallel
-Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
+Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& finished,
                                                   const ManifestHead& head);
 
 // --- the manifest keys common to all products.

@@ -68,20 +68,26 @@ ImageFiles::ImageFiles(const Plan& plan)
     : plan_(plan),
       head_(image_head(plan)),
       format_(formats::find_image_format(plan.job.format)),
-      levels_(formats::find_level_format(plan.job.format)) {
-  if (plan.images->machine)
-    program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
-                     layer_file_options(plan.job), plan.job.compress_programs);
+      levels_(formats::find_level_format(plan.job.format)),
+      in_container_(plan.job.container == Container::kZip && !plan.job.dry_run) {
+  if (!plan.images->machine) return;
+  program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
+                   layer_file_options(plan.job), plan.job.compress_programs);
+  program_->in_memory = in_container_;
 }
 
 Status ImageFiles::open() {
   const Job& job = plan_.job;
+  if (in_container_) {
+    if (Status status = open_container(); !status) return status;
+    return plan_.undecided ? Status() : start();
+  }
   if (Status status = check_shard_fits(job, head_); !status) return status;
   auto claim = prepare_output(job, made_);
   if (!claim) return claim.error();
   if (job.shard) sweep_partial_files(job.output, head_.first_layer, head_.last_layer);
   if (job.resume) {
-    auto kept = layers_that_hold(job.output, manifest_name(job), head_);
+    auto kept = layers_that_hold(job.output, job.output + "/" + manifest_name(job), head_);
     if (!kept) return kept.error();
     if (job.quote && plan_.scene->images.empty()) {
       if (Status status = check_shares_known(head_, *kept); !status) return status;
@@ -94,6 +100,15 @@ Status ImageFiles::open() {
     const LayersOfJob own{&head_, job.shard ? 0 : head_.first_layer, job.shard ? head_.layer_count : head_.last_layer};
     if (Status status = check_no_strays(job.output, own, job.resume); !status) return status;
   }
+  list_todo();
+  if (program_) {
+    if (Status status = program_->begin(); !status) return status;
+  }
+  claim_.emplace(std::move(*claim));
+  return plan_.undecided ? Status() : start();
+}
+
+void ImageFiles::list_todo() {
   auto kept_record = kept_.begin();
   todo_.reserve(head_.last_layer - head_.first_layer - kept_.size());
   for (std::uint32_t index = head_.first_layer; index < head_.last_layer; ++index) {
@@ -104,11 +119,6 @@ Status ImageFiles::open() {
     }
   }
   while (next_kept_ < kept_.size() && (todo_.empty() || kept_[next_kept_].layer.index < todo_.front())) ++next_kept_;
-  if (program_) {
-    if (Status status = program_->begin(); !status) return status;
-  }
-  claim_.emplace(std::move(*claim));
-  return plan_.undecided ? Status() : start();
 }
 
 Status ImageFiles::start() {
@@ -116,6 +126,7 @@ Status ImageFiles::start() {
   head_.layer_count = plan_.layer_count;
   head_.first_layer = plan_.range[0];
   head_.last_layer = plan_.range[1];
+  if (in_container_) return start_container();
   std::vector<std::string> folders{job.output + "/layers"};
   if (program_) folders.push_back(job.output + "/program");
   sync_ = FolderSync::of(folders);
@@ -194,6 +205,14 @@ Status ImageFiles::encode_one(const LayerImages& images, std::size_t number, Fil
 }
 
 Status ImageFiles::store(const LayerImages& images, FileWork& work, LayerRecord& record) const {
+  if (in_container_) {
+    if (Status status = program(images, work, record); !status) return status;
+    work.sums.clear();
+    return for_each_file(record, work, [&](const std::string&, std::span<const std::byte> bytes) {
+      work.sums.push_back(formats::crc_of(bytes));
+      return Status();
+    });
+  }
   const auto files = layer_images(head_, record);
   const FileOptions how = layer_file_options(plan_.job);
   for (std::size_t m = 0; m < files.size() && !files[m].name.empty(); ++m) {
@@ -269,22 +288,98 @@ Status ImageFiles::record_kept_below(std::uint32_t layer) {
   return {};
 }
 
-Status ImageFiles::record(const LayerRecord& record) {
+Status ImageFiles::record(const LayerRecord& record, const FileWork& work) {
   if (Status status = record_kept_below(record.layer.index); !status) return status;
+  if (in_container_) {
+    auto sum = work.sums.begin();
+    Status status = for_each_file(record, work, [&](const std::string& name, std::span<const std::byte> bytes) {
+      return container_->add(name, bytes, *sum++);
+    });
+    if (status) status = container_->flush(plan_.job.sync == Sync::kLayer);
+    return status ? manifest_->append(record) : status;
+  }
   Status status = manifest_->append(record);
   return status && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes + record.program.stored) : status;
 }
 
 Status ImageFiles::finish() {
+  if (kept_container_.finished) return {};
   if (Status status = record_kept_below(UINT32_MAX); !status) return status;
+  if (in_container_) return finish_container();
   // Once for layers and manifest: each wait for the disk takes some milliseconds.
   return manifest_->finish({}, [this] { return plan_.job.sync == Sync::kOff ? Status() : sync_->sync(); });
 }
 
-Status ImageFiles::keep() { return manifest_->flush(); }
+template <class Visit>
+Status ImageFiles::for_each_file(const LayerRecord& record, const FileWork& work, const Visit& visit) const {
+  const auto images = layer_images(head_, record);
+  for (std::size_t m = 0; m < images.size() && !images[m].name.empty(); ++m) {
+    const formats::Bytes& file = head_.named_images() == 0 ? work.file : work.files[m];
+    if (Status status = visit(images[m].name, std::as_bytes(std::span(file))); !status) return status;
+  }
+  return program_ ? visit(program_file_name(record.layer.index, head_.program_extension), work.program.file.stored())
+                  : Status();
+}
+
+Status ImageFiles::open_container() {
+  const Job& job = plan_.job;
+  auto claim = claim_container(job, made_);
+  if (!claim) return claim.error();
+  if (job.resume) {
+    auto kept = find_kept_container(job, head_);
+    if (!kept) return kept.error();
+    kept_container_ = std::move(*kept);
+    kept_ = kept_container_.layers;
+    if (job.quote && plan_.scene->images.empty()) {
+      if (Status status = check_shares_known(head_, kept_); !status) return status;
+    }
+    for (LayerRecord& record : kept_) report_unfed(record);
+  }
+  list_todo();
+  claim_.emplace(std::move(*claim));
+  return {};
+}
+
+Status ImageFiles::start_container() {
+  const Job& job = plan_.job;
+  if (kept_container_.finished) {  // a run that was killed at its very end may have left its begun manifest
+    remove_or_note(part_of(container_manifest(job)));
+    return {};
+  }
+  auto container = JobContainer::open(job, kept_container_);
+  if (!container) return container.error();
+  container_.emplace(std::move(*container));
+  if (program_ && kept_container_.entries.empty()) {
+    const Status status = program_->give_start(
+        [&](const std::string& name, std::span<const std::byte> bytes) { return container_->add(name, bytes); });
+    if (!status) return status;
+  }
+  const bool at_once = job.sync != Sync::kJob || !kept_.empty();
+  auto manifest = ManifestWriter::open(container_manifest(job), head_, kept_, {job.sync, at_once, {}}, std::move(*claim_));
+  if (!manifest) return manifest.error();
+  manifest_.emplace(std::move(*manifest));
+  claim_.reset();
+  return {};
+}
+
+Status ImageFiles::finish_container() {
+  return manifest_->finish_elsewhere([&]() -> Status {
+    Status status;
+    if (program_) {
+      status = program_->give_end(
+          [&](const std::string& name, std::span<const std::byte> bytes) { return container_->add(name, bytes); });
+    }
+    const std::string manifest = part_of(container_manifest(plan_.job));
+    return status ? container_->finish(inspection_, manifest_name(plan_.job), manifest) : status;
+  });
+}
+
+Status ImageFiles::keep() { return manifest_ ? manifest_->flush() : Status(); }
 
 void ImageFiles::discard() {
   if (manifest_) manifest_->discard();
+  if (container_) container_->discard();
+  if (in_container_) return made_.take_back();
   if (!remove_layers(plan_.job.output)) return;
   for (const char* folder : {"layers", "program"}) {
     const std::filesystem::path path = std::filesystem::path(plan_.job.output) / folder;

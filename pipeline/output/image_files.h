@@ -6,10 +6,13 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
+#include "pipeline/output/job_container.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/bit_image.h"
@@ -49,7 +52,7 @@ class ImageFiles {
   Status open();
   /// Starts the manifest of a plan whose layers are decided since open(). errors  kOutput
   Status start();
-  bool started() const { return manifest_.has_value(); }
+  bool started() const { return manifest_.has_value() || kept_container_.finished; }
   /// Layers still to be made, in increasing order; valid after opening.
   std::vector<std::uint32_t> take_todo() { return std::move(todo_); }
   /// Layers kept from an interrupted run.
@@ -64,6 +67,7 @@ class ImageFiles {
     std::vector<formats::Bytes> files;  // those that have names
     Levels levels;                      // drops of each pixel
     ProgramWork program;
+    std::vector<std::uint32_t> sums;  // CRC-32 of the files and of the program, for a container
     std::uint64_t bytes() const;
   };
 
@@ -79,8 +83,12 @@ class ImageFiles {
   std::uint64_t bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const;
 
   // --- from one thread at a time
-  /// In layer order; kept layers are recorded in their place.
-  Status record(const LayerRecord& record);
+  /// In layer order; kept layers are recorded in their place. work  of store(); needed by a container alone
+  Status record(const LayerRecord& record, const FileWork& work);
+  /// Whether record() needs the work.
+  bool records_from_work() const { return in_container_; }
+  /// The text of inspection.json, before the end of a container.
+  void set_inspection(std::string text) { inspection_ = std::move(text); }
   Status finish();
   /// Ends an interrupted or failed job; its finished layers stay recorded.
   Status keep();
@@ -88,6 +96,13 @@ class ImageFiles {
   void discard();
 
  private:
+  /// The files of a layer as stored, and that of its program.
+  template <class Visit>
+  Status for_each_file(const LayerRecord& record, const FileWork& work, const Visit& visit) const;
+  Status open_container();
+  Status start_container();
+  Status finish_container();
+  void list_todo();
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void report_unfed(LayerRecord& record) const;
@@ -103,6 +118,10 @@ class ImageFiles {
   std::optional<Claim> claim_;  // until the manifest is started
   std::optional<ManifestWriter> manifest_;
   std::optional<FolderSync> sync_;
+  bool in_container_;
+  KeptContainer kept_container_;
+  std::optional<JobContainer> container_;
+  std::string inspection_;
   std::vector<std::uint32_t> todo_;
   std::vector<LayerRecord> kept_;
   std::size_t next_kept_ = 0;

@@ -34,16 +34,31 @@ PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string director
       files_(files),
       machine_(replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows())) {}
 
-std::string PrintProgram::path(std::string_view name) const { return fmt::format("{}/program/{}", directory_, name); }
+Status PrintProgram::give_content(const std::string& stem, const program::ProgramBytes& content, const TakeFile& take) const {
+  ContentWriter writer;
+  Status status = writer.open_in_memory(is_compressed(extension_));
+  if (status) status = writer.append(content);
+  if (!status) return status;
+  const auto digest = writer.finish();
+  return digest ? take("program/" + stem + extension_, writer.stored()) : Status(digest.error());
+}
+
+Status PrintProgram::give_start(const TakeFile& take) const {
+  const std::string profile = pipeline::kept_machine_text(resolved_.machine);
+  const Status status = take("program/machine.toml", std::as_bytes(std::span(profile)));
+  return status ? give_content("start", program_frame(resolved_, layers_).start, take) : status;
+}
+
+Status PrintProgram::give_end(const TakeFile& take) const {
+  return give_content("end", program_frame(resolved_, layers_).end, take);
+}
 
 Status PrintProgram::begin() const {
-  const std::string profile = pipeline::kept_machine_text(resolved_.machine);
-  if (Status status = write_file(path("machine.toml"), std::as_bytes(std::span(profile)), files_); !status) {
-    return status;
-  }
-  const ProgramFrame frame = program_frame(resolved_, layers_);
-  const Status status = write_content(path("start" + extension_), frame.start, files_);
-  return status ? write_content(path("end" + extension_), frame.end, files_) : status;
+  const TakeFile write = [&](const std::string& name, std::span<const std::byte> bytes) {
+    return write_file(directory_ + "/" + name, bytes, files_);
+  };
+  const Status status = give_start(write);
+  return status ? give_end(write) : status;
 }
 
 Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
@@ -67,8 +82,10 @@ Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>&
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
   if (!work.timer) work.timer.emplace(*machine_);
   const bool writes = measures || !directory_.empty();  // else the layer is only timed
-  if (measures) {
-    if (Status status = work.file.open_nowhere(is_compressed(extension_)); !status) return status;
+  if (measures || (writes && in_memory)) {
+    const bool compressed = is_compressed(extension_);
+    if (Status status = measures ? work.file.open_nowhere(compressed) : work.file.open_in_memory(compressed); !status)
+      return status;
   } else if (writes) {
     const std::string name = directory_ + "/" + program_file_name(layer.index, extension_);
     if (Status status = work.file.open(name, files_); !status) return status;
@@ -163,7 +180,8 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t dro
   const std::uint64_t moved = grid.blocked_rule == BlockedRule::kNeighbour ? 2 * std::uint64_t{grid.max_swaths()} : 0;
   const std::uint64_t own = 18 * moved * grid.passes * grid.blocked.size() * grid.positions;
   return rows + own + 4 * maintenance + 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 4 * changes + turned + kept +
-         (is_compressed(extension_) && !directory_.empty() ? ContentWriter::kMaxBytes : 0) + (512 << 10);
+         (is_compressed(extension_) && !directory_.empty() ? ContentWriter::kMaxBytes : 0) +
+         (in_memory ? file_bound(drops) : 0) + (512 << 10);
 }
 
 }  // namespace lamina::pipeline

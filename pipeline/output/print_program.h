@@ -8,7 +8,9 @@
 // <ext> ends in .zst, unless the job turns it off.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -58,7 +60,11 @@ class PrintProgram {
   PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers, const FileOptions& files,
                bool compress = false);
 
-  /// Writes machine.toml, start and end. errors  kOutput
+  using TakeFile = std::function<Status(const std::string& name, std::span<const std::byte> bytes)>;
+  /// Gives away machine.toml and start, or end, as they are stored, with their folder. errors  of `take`; kMemory
+  Status give_start(const TakeFile& take) const;
+  Status give_end(const TakeFile& take) const;
+  /// Writes them into the directory. errors  kOutput
   Status begin() const;
 
   /// Compiles a layer, times it and writes its file, sweep by sweep. errors  kOutput
@@ -75,6 +81,7 @@ class PrintProgram {
   Status write_layer(const Layer& layer, const Drops& drops, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
                      ProgramRecord& record, bool measures = false) const;
 
+  bool in_memory = false;              // the files of layers stay in their work, instead of the directory; set first
   std::vector<std::uint32_t> refills;  // layers before which the program pauses for vats to be filled, in order; set first
 
   /// Upper bound of write_layer's memory, in bytes, for an image with so many changes, or two for each run of a zone.
@@ -85,9 +92,9 @@ class PrintProgram {
  private:
   /// compile(emit)  makes the sweeps
   template <class Compile>
-  Status write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work, ProgramRecord& record, bool measures,
-               const Compile& compile) const;
-  std::string path(std::string_view name) const;
+  Status write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work, ProgramRecord& record,
+               bool measures, const Compile& compile) const;
+  Status give_content(const std::string& stem, const program::ProgramBytes& content, const TakeFile& take) const;
   /// Of a layer.
   std::uint64_t max_sweeps(std::uint32_t drops) const;
   const ResolvedMachine& resolved_;

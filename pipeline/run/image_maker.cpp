@@ -145,9 +145,10 @@ class ImageMaker : public Maker {
     std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
     std::iota(all.begin(), all.end(), plan_.range[0]);
     if (plan_.job.dry_run) return all;
-    if (Status status = inspector_->check_file(); !status) return status.error();
+    const bool has_directory = !files_.records_from_work();
+    if (Status status = has_directory ? inspector_->check_file() : Status(); !status) return status.error();
     if (Status status = files_.open(); !status) return status.error();
-    if (Status status = inspector_->open(files_.head()); !status) return status.error();
+    if (Status status = has_directory ? inspector_->open(files_.head()) : Status(); !status) return status.error();
     if (!inspector_->on()) return files_.take_todo();
     // An inspection needs all layers: the sections of kept ones are made again, without their files.
     is_kept_.assign(all.size(), 0);
@@ -232,7 +233,7 @@ class ImageMaker : public Maker {
         [this](const Layer&, Work& work, Made& made) { return files_.store(images_of(work), work.files, made.record); });
     return steps;
   }
-  bool records_from_work() const override { return inspector_->on(); }
+  bool records_from_work() const override { return inspector_->on() || files_.records_from_work(); }
 
   Status record(std::uint32_t layer, const Ticket& ticket) override {
     const Made& made = made_[ticket.record];
@@ -241,7 +242,7 @@ class ImageMaker : public Maker {
     }
     if (is_kept(layer)) return {};
     if (!plan_.job.dry_run) {
-      if (Status status = files_.record(made.record); !status) return status;
+      if (Status status = files_.record(made.record, work_[ticket.work].files); !status) return status;
     }
     observers_.layer(made.record, &made.notes);
     checks_.record(made.record.layer.index, made.record.set_pixels > 0);
@@ -266,8 +267,9 @@ class ImageMaker : public Maker {
   Status finish() override {
     if (plan_.job.dry_run) return {};
     if (Status status = inspector_->finish(); !status) return status;
+    if (files_.records_from_work() && inspector_->on()) files_.set_inspection(inspector_->text(files_.head()));
     const Status status = files_.finish();
-    return status ? inspector_->write(files_.head()) : status;
+    return status && !files_.records_from_work() ? inspector_->write(files_.head()) : status;
   }
   Status stop(bool keep) override {
     if (!plan_.job.dry_run && keep) return files_.keep();

@@ -209,6 +209,10 @@ Status Inspector::write(const ManifestHead& head) const {
   return write_inspection(plan_.job.output, head, facts_of(*inspection_, head_, reports_));
 }
 
+std::string Inspector::text(const ManifestHead& head) const {
+  return inspection_text(head, facts_of(*inspection_, head_, reports_));
+}
+
 bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }
 
 WholeInspection inspect_kept(const ManifestHead& job, std::span<const KeptLayers> kept) {

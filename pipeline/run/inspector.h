@@ -56,6 +56,8 @@ class Inspector : public ImageObserver {
   Status open(const ManifestHead& head);
   /// After the last layer, before the manifest takes its name. errors  kOutput
   Status finish();
+  /// The text of inspection.json; after warn(), of a whole job.
+  std::string text(const ManifestHead& head) const;
   /// After warn() and the manifest. Without findings the file stays if it is of the same job, and is removed if it is of
   /// another.
   Status write(const ManifestHead& head) const;

@@ -8,17 +8,21 @@
 #include <span>
 #include <utility>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/compare.h"
 #include "pipeline/manifest/inspection_file.h"
 #include "pipeline/manifest/kept_sections.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
+#include "pipeline/output/job_container.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/run/inspector.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/support/io/compressed.h"
+#include "stages/support/io/container.h"
 #include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
 #include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {
@@ -41,7 +45,7 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
   std::vector<fs::path> detected;
   for (const std::string& directory : directories) {
     std::error_code error;
-    if (!fs::is_directory(directory, error)) {
+    if (!is_job_folder(directory)) {
       return Error{Fault::kUsage, fmt::format("{}: no such directory; name those that the shards were written to", directory)};
     }
     const fs::path canonical = fs::canonical(directory, error);
@@ -221,6 +225,125 @@ std::optional<Json> inspect(std::span<const Shard> shards, std::vector<Warning>&
   return std::move(found.facts);
 }
 
+/// Gives the files of the shards their places in the directory, and then writes its manifest.
+Status merge_into_directory(std::span<const Shard> shards, const std::string& output, const std::optional<Json>& inspection,
+                            MergeReport& report) {
+  if (Status status = inspection ? check_inspection_file(output) : Status(); !status) return status;
+  std::error_code error;
+  fs::create_directories(output, error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", output, error.message())};
+  auto claim = Claim::take((fs::path(output) / "manifest.json").string(), output);
+  if (!claim) return claim.error();
+  ManifestHead head = shards.front().manifest.head;
+  const auto is_known = check_output(output, head, *claim);
+  if (!is_known) return is_known.error();
+  sweep_partial_files(output);
+  if (Status status = check_no_strays(output, {&head, 0, head.layer_count}, true); !status) return status.error();
+  if (Status status = check_stays_inside(output); !status) return status.error();
+  fs::create_directories(fs::path(output) / "layers", error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}/layers: {}", output, error.message())};
+  if (!head.machine.empty()) fs::create_directories(fs::path(output) / "program", error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}/program: {}", output, error.message())};
+
+  const auto sync = FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
+  head.first_layer = 0;
+  head.last_layer = head.layer_count;
+  // Begun before any file comes: it identifies the owner of the files for a later merge.
+  auto writer = ManifestWriter::open((fs::path(output) / "manifest.json").string(), head, {}, {}, std::move(*claim));
+  if (!writer) return writer.error();
+  for (const Shard& shard : shards) {
+    Status status = bring_files(shard, output, report);
+    if (status) continue;
+    // It is needed to know files by; in a shard's directory it would be in the way of --resume.
+    if (*is_known || report.linked + report.copied == 0) writer->discard();
+    return status.error();
+  }
+  for (const Shard& shard : shards) {
+    for (const LayerRecord& record : shard.manifest.layers) {
+      if (Status status = writer->append(record); !status) return status.error();
+    }
+    report.layers += shard.manifest.layers.size();
+  }
+  // Before the manifest, after which shards are not read again.
+  if (Status status = inspection ? write_inspection(output, head, *inspection) : keep_inspection_of(output, head); !status)
+    return status.error();
+  if (Status status = writer->finish({}, [&sync] { return sync.sync(); }); !status) return status.error();
+  if (Status status = remove_shard_manifests(output); !status) return status.error();
+  return {};
+}
+
+/// Copies the files of the shards into one container, each compared with its hash.
+class ContainerMerge {
+ public:
+  ContainerMerge(std::span<const Shard> shards, MergeReport& report) : shards_(shards), report_(report) {
+    head_.first_layer = 0;
+    head_.last_layer = head_.layer_count;
+  }
+
+  Status run(const std::string& output, const std::optional<Json>& inspection) {
+    if (is_file(output)) return usage("{}: is there already; name another file with -o", output);
+    Job job;
+    job.output = output;
+    job.resume = true;  // of a merge that was killed, nothing is kept
+    if (Status status = check_container(job); !status) return status;
+    MadeFolders made;
+    auto claim = claim_container(job, made);
+    if (!claim) return claim.error();
+    auto container = JobContainer::open(job, {});
+    if (!container) return container.error();
+    container_.emplace(std::move(*container));
+    auto writer = ManifestWriter::open(container_manifest(job), head_, {}, {}, std::move(*claim));
+    if (!writer) return writer.error();
+    Status status = add_files(*writer);
+    const std::string facts = inspection ? inspection_text(head_, *inspection) : std::string();
+    if (status) {
+      status = writer->finish_elsewhere(
+          [&] { return container_->finish(facts, "manifest.json", part_of(container_manifest(job))); });
+    }
+    if (status) return status;
+    writer->discard();
+    container_->discard();
+    return status;
+  }
+
+ private:
+  Status add_files(ManifestWriter& writer) {
+    const Shard& first = shards_.front();
+    const bool program = !head_.machine.empty();
+    Status status = program ? add(first, "program/machine.toml", head_.machine_profile) : Status();
+    if (status && program) status = add(first, "program/start" + head_.program_extension, head_.program_start);
+    for (const Shard& shard : shards_) {
+      for (const LayerRecord& record : shard.manifest.layers) {
+        for (const LayerImageFile& image : layer_images(head_, record)) {
+          if (status && !image.name.empty()) status = add(shard, image.name, image.record.hash, image.record.bytes);
+        }
+        if (status && program) {
+          status = add(shard, program_file_name(record.layer.index, head_.program_extension), record.program.hash,
+                       record.program.bytes);
+        }
+        if (status) status = writer.append(record);
+        if (!status) return status;
+      }
+      report_.layers += shard.manifest.layers.size();
+    }
+    return program ? add(first, "program/end" + head_.program_extension, head_.program_end) : status;
+  }
+
+  Status add(const Shard& shard, const std::string& name, const Hash128& hash, std::optional<std::uint64_t> bytes = {}) {
+    if (const std::string fault = fault_of_file(shard.directory, name, hash, bytes); !fault.empty())
+      return unmatched(fmt::format("{}/{}; run its shard again with --resume", shard.directory, fault));
+    const auto content = read_file((fs::path(shard.directory) / name).string(), {});
+    if (!content) return content.error();
+    ++report_.copied;
+    return container_->add(name, std::as_bytes(std::span(*content)));
+  }
+
+  std::span<const Shard> shards_;
+  MergeReport& report_;
+  ManifestHead head_ = shards_.front().manifest.head;
+  std::optional<JobContainer> container_;
+};
+
 }  // namespace
 
 Result<MergeReport> merge(const MergeRequest& request) {
@@ -246,50 +369,10 @@ Result<MergeReport> merge(const MergeRequest& request) {
   if (!inspection && report.warnings.size() > before && std::ranges::any_of(*shards, is_output))
     return unmatched(report.warnings.back().text + "; without inspection, merge into another directory");
   if (Status status = checks::refuse_warnings(report.warnings); request.strict && !status) return status.error();
-  if (Status status = inspection ? check_inspection_file(output) : Status(); !status) return status.error();
-
-  std::error_code error;
-  fs::create_directories(output, error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", output, error.message())};
-  auto claim = Claim::take((fs::path(output) / "manifest.json").string(), output);
-  if (!claim) return claim.error();
-  ManifestHead head = shards->front().manifest.head;
-  const auto is_known = check_output(output, head, *claim);
-  if (!is_known) return is_known.error();
-  sweep_partial_files(output);
-  if (Status status = check_no_strays(output, {&head, 0, head.layer_count}, true); !status) return status.error();
-  if (Status status = check_stays_inside(output); !status) return status.error();
-  fs::create_directories(fs::path(output) / "layers", error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}/layers: {}", output, error.message())};
-  if (!head.machine.empty()) fs::create_directories(fs::path(output) / "program", error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}/program: {}", output, error.message())};
-
-  const auto sync = FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
   report.shards = static_cast<std::uint32_t>(shards->size());
-  head.first_layer = 0;
-  head.last_layer = head.layer_count;
-  // Begun before any file comes: it identifies the owner of the files for a later merge.
-  auto writer = ManifestWriter::open((fs::path(output) / "manifest.json").string(), head, {}, {}, std::move(*claim));
-  if (!writer) return writer.error();
-  for (const Shard& shard : *shards) {
-    Status status = bring_files(shard, output, report);
-    if (status) continue;
-    // It is needed to know files by; in a shard's directory it would be in the way of --resume.
-    if (*is_known || report.linked + report.copied == 0) writer->discard();
-    return status.error();
-  }
-  for (const Shard& shard : *shards) {
-    for (const LayerRecord& record : shard.manifest.layers) {
-      if (Status status = writer->append(record); !status) return status.error();
-    }
-    report.layers += shard.manifest.layers.size();
-  }
-  // Before the manifest, after which shards are not read again.
-  if (Status status = inspection ? write_inspection(output, head, *inspection) : keep_inspection_of(output, head); !status)
-    return status.error();
-  if (Status status = writer->finish({}, [&sync] { return sync.sync(); }); !status) return status.error();
-  if (Status status = remove_shard_manifests(output); !status) return status.error();
-  return report;
+  const Status merged = output.ends_with(".zip") ? ContainerMerge(*shards, report).run(output, inspection)
+                                                 : merge_into_directory(*shards, output, inspection, report);
+  return merged ? Result<MergeReport>(report) : merged.error();
 }
 
 }  // namespace lamina::pipeline

@@ -10,6 +10,7 @@
 
 #include "pipeline/flow/layers.h"
 #include "pipeline/output/directory.h"
+#include "pipeline/output/job_container.h"
 #include "pipeline/output/slice_files.h"
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/report/heights_study.h"
@@ -29,7 +30,8 @@ namespace {
 /// Refuses protected output before parts are loaded.
 Status check_output_of(const Resolved& resolved) {
   switch (resolved.product) {
-    case Product::kImages: return check_output(resolved.job);
+    case Product::kImages:
+      return resolved.job.container == Container::kNone ? check_output(resolved.job) : check_container(resolved.job);
     case Product::kContours: return check_slice_output(resolved.job);
     case Product::kMoves: return check_toolpath_output(resolved.job, resolved.extruder->machine);
   }
@@ -251,7 +253,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   limits.max_in_flight = layers_in_flight();
   limits.processor_times = job.timing;
   limits.record_slots = 2 * limits.max_in_flight;  // some layers wait for an older one, in a single file with their scratch
-  if (product != Product::kImages) limits.max_in_flight = limits.record_slots;
+  if (product != Product::kImages || job.container != Container::kNone) limits.max_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
   if (job.timing) summary.timing = timing_of(*plan, {before, before});
   if (Status status = check_space(*plan, summary); !status) return status.error();

@@ -28,6 +28,11 @@ std::uint64_t bits_of_images(const ManifestHead& head) {
 std::uint64_t bytes_there(const Job& job) {
   if ((!job.resume && !job.overwrite) || job.shard) return 0;
   std::uint64_t bytes = 0;
+  if (job.container != Container::kNone) {  // a finished one is replaced at the end
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(job.output + ".part", error);
+    return error ? 0 : size;
+  }
   for (const fs::path& file : layer_files(job.output)) {
     std::error_code error;
     const std::uintmax_t size = fs::file_size(file, error);
@@ -54,8 +59,7 @@ SpaceNeed estimate_space(const Plan& plan) {
     record.layer = layer;
     ImageNotes notes;
     if (!imager.make(layer, work, record, notes)) continue;
-    if (!files.measure({work.runs, work.materials.image, work.drops.drops, work.drops.shares}, file_work, record))
-      continue;
+    if (!files.measure({work.runs, work.materials.image, work.drops.drops, work.drops.shares}, file_work, record)) continue;
     bytes += record.bytes + record.program.stored;
   }
   need.bytes = bytes / need.sampled * layers + layers * kBytesOfLayer;

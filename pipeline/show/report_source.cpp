@@ -1,5 +1,5 @@
-#include "pipeline/job/file.h"
 #include "pipeline/show/report_source.h"
+#include "pipeline/job/file.h"
 
 #include <fmt/format.h>
 
@@ -17,6 +17,9 @@
 #include "stages/raster/beads.h"
 #include "stages/slice/deep.h"
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/container.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -28,9 +31,8 @@ Error wrong(const std::string& path, std::string_view what) {
 }
 
 Result<Manifest> finished_manifest(const std::string& position, const std::string& path) {
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) {
-    if (fs::exists(path + ".part", ignored)) {
+  if (!is_file(path)) {
+    if (is_file(path + ".part") || is_file(part_of(position))) {
       return wrong(position, "the job is not finished; complete it with --resume first");
     }
     return wrong(position,
@@ -181,8 +183,7 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
 }  // namespace
 
 Result<ReportSource> report_source(const std::string& path) {
-  std::error_code ignored;
-  const bool toolpaths = fs::is_regular_file(path, ignored);
+  const bool toolpaths = is_file(path) && !is_container(path);
   ReportSource source;
   source.manifest_path = toolpaths ? path + ".json" : path + "/manifest.json";
   auto manifest = finished_manifest(path, source.manifest_path);

@@ -15,6 +15,8 @@
 #include "stages/formats/svg/svg_writer.h"
 #include "stages/geometry/combine.h"
 #include "stages/replay/jetting.h"
+#include "stages/support/io/container.h"
+#include "stages/support/io/file.h"
 #include "stages/support/text/readable.h"
 #include "stages/view/picture/canvas.h"
 #include "stages/view/picture/contact_sheet.h"
@@ -29,11 +31,11 @@ constexpr std::uint32_t kSheetWidth = 2400, kSwathWidth = 1200;
 Result<Manifest> manifest_of(const std::string& directory) {
   std::error_code ignored;
   const std::string whole = directory + "/manifest.json", part = whole + ".part";
-  if (!std::filesystem::exists(whole, ignored) && std::filesystem::exists(part, ignored)) return read_manifest(part);
+  if (!is_file(whole) && is_file(part)) return read_manifest(part);
   if (!std::filesystem::exists(directory, ignored)) {
     return Error{Fault::kUsage, fmt::format("{}: no such directory or file", directory)};
   }
-  if (!std::filesystem::exists(whole, ignored)) {
+  if (!is_file(whole)) {
     return Error{Fault::kVerification,
                  fmt::format("{}: no manifest.json; name a directory that lamina jet or lamina slice wrote (shards: run "
                              "lamina merge first)",
@@ -123,7 +125,9 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
                                             manifest.layers.front().layer.index, manifest.layers.back().layer.index)};
   }
   const auto machine = machine_of_job(directory, head);
-  if (!machine) return Error{machine.error().fault, fmt::format("{}/{}; run lamina verify for details", directory, machine.error().message)};
+  if (!machine)
+    return Error{machine.error().fault,
+                 fmt::format("{}/{}; run lamina verify for details", directory, machine.error().message)};
   const auto expected = ExpectedDrops::of(head, machine->profile());
   if (!expected) return expected.error();
   if (Status status = check_images(directory, head, *record); !status) return status.error();
@@ -252,7 +256,7 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
 Result<Preview> draw_preview(const PreviewRequest& request) {
   const std::string ending = std::filesystem::path(request.output).extension().string();
   std::error_code ignored;
-  const bool toolpaths = std::filesystem::is_regular_file(request.source, ignored);
+  const bool toolpaths = is_file(request.source) && !is_container(request.source);
   if (!toolpaths && (request.gcode.filament_mm > 0 || request.gcode.layer_height_mm > 0)) {
     return Error{Fault::kUsage, "--filament, --layer-height: are for G-code files; leave them out"};
   }

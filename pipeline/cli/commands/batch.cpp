@@ -50,6 +50,7 @@ CommandSpec batch_spec() {
       {"--jobs", "N", "max number of concurrent jobs; 0: one per processor", "0", "Run"},
       {"--memory", "SIZE", "memory limit of all running jobs: 512M, 4G", "1G", "Run"},
       {"--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off", "job", "Run", sync->words()},
+      {"--container", "KIND", "zip: one ZIP file for each job of images that names none", "none", "Run", {"none", "zip"}},
       {"--cache", "FOLDER", "take the files of equal jobs from a cache, or add them", "", "Run"},
       {"--cache-link", "", "make read-only hard links to the cache, no copies", "", "Run"},
       {"--time-limit", "SECONDS", "time limit per job in seconds; slower jobs fail with exit code 3", "", "Run"},
@@ -215,6 +216,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const BatchOptions& options = *read;
   Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
+  add_container(*entries, arguments.text("--container"));
   const auto cache = open_cache(arguments, context);
   if (!cache) return cache.error();
   const BatchShare share{options.directory, layer_share(options.memory_bytes, options.jobs),

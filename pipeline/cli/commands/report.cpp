@@ -6,6 +6,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/pores/pore_analysis.h"
 #include "pipeline/show/report.h"
+#include "stages/support/io/container.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/readable.h"
 
@@ -52,7 +53,7 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--memory", read_bytes, options.memory_bytes); !status) return status;
   options.parts = arguments.all("--parts");
   std::error_code ignored;
-  if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored))
+  if (!options.parts.empty() && is_file(arguments.operands.front()) && !is_container(arguments.operands.front()))
     return at_option("--parts", "is of jobs of images; a page of toolpaths has no views of the parts, leave it out");
   for (const std::string& parts : options.parts) {
     if (!std::filesystem::exists(parts, ignored)) return failure(Fault::kInput, "--parts: {}: no such file or folder", parts);

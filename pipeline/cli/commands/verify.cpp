@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "pipeline/batch/check_batch.h"
 #include "pipeline/batch/whole.h"
@@ -12,6 +11,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/report/replay_text.h"
 #include "stages/checks/layer_warnings.h"
+#include "stages/support/io/container.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
@@ -68,11 +68,10 @@ Json report_json(const VerifyReport& report) {
 
 /// errors  kUsage: options of G-code files with a directory
 Status check_toolpath_options(const Arguments& arguments) {
-  std::error_code ignored;
   for (const std::string& operand : arguments.operands) {
-    if (!std::filesystem::is_directory(operand, ignored)) continue;
+    if (!is_job_folder(operand)) continue;
     for (const char* option : {"--machine", "--material", "--filament", "--model", "--parts"}) {
-      if (arguments.has(option)) return at_option(option, "is of G-code files, and " + operand + " is a directory");
+      if (arguments.has(option)) return at_option(option, "is of G-code files, and " + operand + " is a job of images");
     }
   }
   if (arguments.has("--material") && !arguments.has("--machine")) return at_option("--material", "needs --machine");

@@ -30,6 +30,7 @@ Job unusual_job(const Directory& directory) {
   job.format = "png";
   job.title = "order 7";
   job.compress_programs = false;
+  job.container = Container::kZip;
   job.image_content = ImageContent::kDrops;
   job.slice = {"cli", true, true, 2.5, 0.25, -0.125};
   job.fill.all.gap_mm = {0.1, 0.25};
