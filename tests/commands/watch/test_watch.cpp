@@ -249,6 +249,7 @@ TEST_F(WatchedFolder, PartsWaitForTheCorrectionOfTheirSettings) {
         {"settle_s = \"soon\"\n", "in/sub/watch.toml:1:12: settle_s: "},
         {"with = \"batch\"\n", "'batch' cannot be a job"},
         {"with = \"jet -o x\"\n", "has -o"},
+        {"with = \"jet --machine nuferbj --quote q.csv\"\n", "with: --quote q.csv: is one file for all parts"},
         {"with = \"jet --dip 3\"\n", "--dip"},
         {"output = \".\"\n", "is in the watched folder"},
         {"", "in/sub/watch.toml: is empty or incomplete"},
