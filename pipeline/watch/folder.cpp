@@ -37,15 +37,16 @@ bool is_watched_name(const std::string& name) {
   return !name.starts_with('.') && (is_toml_name(name) || load::is_part_name(name));
 }
 
-/// Whether the system states that no process has the file open for writing: on local file systems, for files of this user.
-/// A lease is refused while a writer has the file open; a writer that comes meanwhile waits for an instant.
-bool has_no_writer(const std::string& path) {
+/// Whether a process has the file open for writing; nothing if the system does not state it: it does on local file systems,
+/// for files of this user. A lease is refused while a writer has the file open; a writer that comes meanwhile waits for an
+/// instant.
+std::optional<bool> has_writer(const std::string& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-  if (file < 0) return false;
-  const bool leased = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0;
+  if (file < 0) return std::nullopt;
+  const bool leased = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0, refused = !leased && errno == EAGAIN;
   if (leased) ::fcntl(file, F_SETLEASE, F_UNLCK);
   ::close(file);
-  return leased;
+  return leased || refused ? std::optional(refused) : std::nullopt;
 }
 
 }  // namespace
@@ -71,7 +72,7 @@ Result<Folder> Folder::open(const std::string& root, std::vector<std::string> sk
   // File systems that cannot lock a folder have one watcher by agreement.
   if (::flock(folder.held_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     return failure(Fault::kOutput, "{}: another watcher has this folder right now; stop it, or name another folder", root);
-  std::signal(SIGIO, SIG_IGN);  // of has_no_writer()
+  std::signal(SIGIO, SIG_IGN);  // of has_writer()
   folder.events_ = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
   if (folder.events_ < 0)
     folder.report(fmt::format("no events of the system ({}); the folder is polled", std::strerror(errno)));
@@ -151,7 +152,7 @@ void Folder::take_file(const std::string& relative, std::map<std::string, Watche
   const auto change = changes_.find(relative);
   const bool has_event = change != changes_.end();
   if (known == files_.end() || !(file.stamp == *stamp) || (has_event && change->second == Event::kChanged)) {
-    file = {*stamp, WatchedFile::Arrival::kUnknown, Clock::now(), false, {}};
+    file = {*stamp, WatchedFile::Arrival::kUnknown, Clock::now(), false, {}, false};
   }
   if (!has_event || change->second == Event::kChanged) return;
   file.end.reset();
@@ -197,18 +198,20 @@ bool Folder::is_complete(const std::string& relative, double settle_seconds, con
   const bool settled = Clock::now() - file.unchanged_since >= std::chrono::duration<double>(settle_seconds);
   if (!settled && file.arrival == WatchedFile::Arrival::kUnknown) {
     // It may have been closed before its folder had events. A writer that has it open will close it.
-    if (std::exchange(file.writer_checked, true) || !has_no_writer(path_of(relative))) return false;
+    if (std::exchange(file.writer_checked, true) || has_writer(path_of(relative)) != false) return false;
     file.arrival = WatchedFile::Arrival::kClosed;
   }
   if (!file.end) file.end = end_of_file(path_of(relative), stop);
   const bool renamed = file.arrival == WatchedFile::Arrival::kRenamed;
-  return file.end->content != FileEnd::Content::kMissing &&
-         (settled || renamed || file.end->content == FileEnd::Content::kStated);
+  const bool complete = file.end->content != FileEnd::Content::kMissing &&
+                        (settled || renamed || file.end->content == FileEnd::Content::kStated);
+  file.has_writer = complete && has_writer(path_of(relative)) == true;
+  return complete && !file.has_writer;
 }
 
-bool Folder::stays_incomplete(const WatchedFile& file, double settle_seconds) {
-  return file.end && file.end->content == FileEnd::Content::kMissing &&
-         Clock::now() - file.unchanged_since >= std::chrono::duration<double>(settle_seconds);
+std::string Folder::lack_of(const WatchedFile& file, double settle_seconds) {
+  if (!file.end || Clock::now() - file.unchanged_since < std::chrono::duration<double>(settle_seconds)) return {};
+  return file.has_writer ? "a program has it open for writing" : file.end->missing;
 }
 
 }  // namespace lamina::pipeline

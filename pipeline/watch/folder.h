@@ -32,6 +32,7 @@ struct WatchedFile {
   std::chrono::steady_clock::time_point unchanged_since;
   bool writer_checked = false;  // for this stamp, without an event
   std::optional<FileEnd> end;   // of this stamp, if it was read
+  bool has_writer = false;      // would be complete, but a process has it open for writing
 };
 
 class Folder {
@@ -61,11 +62,12 @@ class Folder {
   std::vector<std::string> take_problems();
 
   /// Whether the file has all of its content: it has the length that it states, and was closed, renamed or unchanged for
-  /// `settle_seconds`; or it states none, nothing is missing, and it was renamed or unchanged for so long.
+  /// `settle_seconds`; or it states none, nothing is missing, and it was renamed or unchanged for so long. No process has it
+  /// open for writing, where the system states that.
   /// cost  of end_of_file(), once for each change
   bool is_complete(const std::string& relative, double settle_seconds, const std::atomic<bool>& stop);
-  /// Whether the file is unchanged for so long, and incomplete. Only after is_complete().
-  static bool stays_incomplete(const WatchedFile& file, double settle_seconds);
+  /// What a file lacks that is unchanged for so long; "" if nothing. Only after is_complete().
+  static std::string lack_of(const WatchedFile& file, double settle_seconds);
 
  private:
   enum class Event { kChanged, kClosed, kRenamed };

@@ -30,6 +30,12 @@ class FilesOfAFolder : public ::testing::Test {
     scan();
     return folder_.is_complete(name, settle_seconds, kNoStop);
   }
+  bool has_leases(const std::string& name) {
+    const int file = ::open((directory_ / name).c_str(), O_RDONLY | O_CLOEXEC);
+    const bool leased = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0;
+    ::close(file);
+    return leased;
+  }
   void put_box(const std::string& name) { test::write_box(directory_ / name, {0, 0, 0}, {1, 2, 3}); }
 
   test::Directory directory_;
@@ -68,10 +74,7 @@ TEST_F(FilesOfAFolder, AreCompleteAtOnceWhenTheirWriterClosesThemAndTheyStateThe
 TEST_F(FilesOfAFolder, AreCompleteAtOnceEvenIfTheyCameBeforeTheEventsOfTheirFolder) {
   fs::create_directories(directory_ / "sub");
   put_box("sub/a.stl");
-  const int file = ::open((directory_ / "sub/a.stl").c_str(), O_RDONLY | O_CLOEXEC);
-  const bool has_leases = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0;
-  ::close(file);
-  if (!has_leases) GTEST_SKIP() << "a file system without leases";
+  if (!has_leases("sub/a.stl")) GTEST_SKIP() << "a file system without leases";
   EXPECT_TRUE(complete("sub/a.stl"));
   std::ofstream open(directory_ / "sub/a.stl", std::ios::binary | std::ios::in);
   Folder other = std::move(*Folder::open(directory_ / "sub", {}));
@@ -103,7 +106,21 @@ TEST_F(FilesOfAFolder, AreCompleteAtOnceWhenTheyAreRenamedUnlessSomethingIsMissi
   fs::resize_file(directory_ / "new.part", 83);
   fs::rename(directory_ / "new.part", directory_ / "b.stl");
   EXPECT_FALSE(complete("b.stl", 0));
-  EXPECT_TRUE(Folder::stays_incomplete(folder_.files().at("b.stl"), 0));
+  EXPECT_EQ(Folder::lack_of(folder_.files().at("b.stl"), 0), "83 of at least 84 bytes");
+}
+
+TEST_F(FilesOfAFolder, AreIncompleteWhileAnyoneHasThemOpenForWritingHoweverLongUnchanged) {
+  put_box("a.stl");
+  test::write_text(directory_ / "b.obj", "v 0 0 0\n");
+  if (!has_leases("a.stl")) GTEST_SKIP() << "a file system without leases";
+  for (const char* name : {"a.stl", "b.obj"}) {
+    EXPECT_TRUE(complete(name, 0));
+    std::ofstream open(directory_ / name, std::ios::binary | std::ios::in);
+    EXPECT_FALSE(complete(name, 0)) << name;
+    EXPECT_EQ(Folder::lack_of(folder_.files().at(name), 0), "a program has it open for writing");
+    open.close();
+    EXPECT_TRUE(complete(name, 0)) << name;
+  }
 }
 
 TEST_F(FilesOfAFolder, OfOtherFormatsAreCompleteAfterATimeWithoutAChange) {
