@@ -25,6 +25,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr std::chrono::seconds kReadAgainAfter{1};  // of a file that could not be read
 constexpr std::uint32_t kEvents = IN_CLOSE_WRITE | IN_MOVED_TO | IN_MODIFY | IN_CREATE | IN_MOVED_FROM | IN_DELETE |
                                   IN_ONLYDIR | IN_DONT_FOLLOW | IN_EXCL_UNLINK;
 
@@ -152,7 +153,7 @@ void Folder::take_file(const std::string& relative, std::map<std::string, Watche
   const auto change = changes_.find(relative);
   const bool has_event = change != changes_.end();
   if (known == files_.end() || !(file.stamp == *stamp) || (has_event && change->second == Event::kChanged)) {
-    file = {*stamp, WatchedFile::Arrival::kUnknown, Clock::now(), false, {}, false};
+    file = {*stamp, WatchedFile::Arrival::kUnknown, Clock::now(), false, {}, {}, false};
   }
   if (!has_event || change->second == Event::kChanged) return;
   file.end.reset();
@@ -201,7 +202,10 @@ bool Folder::is_complete(const std::string& relative, double settle_seconds, con
     if (std::exchange(file.writer_checked, true) || has_writer(path_of(relative)) != false) return false;
     file.arrival = WatchedFile::Arrival::kClosed;
   }
-  if (!file.end) file.end = end_of_file(path_of(relative), stop);
+  if (!file.end || (file.end->unread && Clock::now() - file.end_read_at >= kReadAgainAfter)) {
+    file.end = end_of_file(path_of(relative), stop);
+    file.end_read_at = Clock::now();
+  }
   const bool renamed = file.arrival == WatchedFile::Arrival::kRenamed;
   const bool complete = file.end->content != FileEnd::Content::kMissing &&
                         (settled || renamed || file.end->content == FileEnd::Content::kStated);

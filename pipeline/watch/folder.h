@@ -32,6 +32,7 @@ struct WatchedFile {
   std::chrono::steady_clock::time_point unchanged_since;
   bool writer_checked = false;  // for this stamp, without an event
   std::optional<FileEnd> end;   // of this stamp, if it was read
+  std::chrono::steady_clock::time_point end_read_at;
   bool has_writer = false;      // would be complete, but a process has it open for writing
 };
 
@@ -64,7 +65,7 @@ class Folder {
   /// Whether the file has all of its content: it has the length that it states, and was closed, renamed or unchanged for
   /// `settle_seconds`; or it states none, nothing is missing, and it was renamed or unchanged for so long. No process has it
   /// open for writing, where the system states that.
-  /// cost  of end_of_file(), once for each change
+  /// cost  of end_of_file(), once for each change; of a file that cannot be read, once a second
   bool is_complete(const std::string& relative, double settle_seconds, const std::atomic<bool>& stop);
   /// What a file lacks that is unchanged for so long; "" if nothing. Only after is_complete().
   static std::string lack_of(const WatchedFile& file, double settle_seconds);

@@ -123,6 +123,19 @@ TEST_F(FilesOfAFolder, AreIncompleteWhileAnyoneHasThemOpenForWritingHoweverLongU
   }
 }
 
+TEST_F(FilesOfAFolder, AreReadAgainAfterAnErrorWithoutAChange) {
+  put_box("a.stl");
+  const int file = ::open((directory_ / "a.stl").c_str(), O_RDONLY | O_CLOEXEC);
+  if (::fcntl(file, F_SETLEASE, F_WRLCK) != 0) GTEST_SKIP() << "a file system without leases";  // nobody else can open it
+  EXPECT_FALSE(complete("a.stl", 0));
+  EXPECT_NE(Folder::lack_of(folder_.files().at("a.stl"), 0).find("a.stl: cannot be opened"), std::string::npos);
+  ::fcntl(file, F_SETLEASE, F_UNLCK);
+  ::close(file);
+  EXPECT_FALSE(complete("a.stl", 0));  // not at once: there is no busy loop
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  EXPECT_TRUE(complete("a.stl", 0));
+}
+
 TEST_F(FilesOfAFolder, OfOtherFormatsAreCompleteAfterATimeWithoutAChange) {
   test::write_text(directory_ / "a.obj", "v 0 0 0\n");
   EXPECT_FALSE(complete("a.obj"));
