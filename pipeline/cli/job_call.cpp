@@ -194,8 +194,8 @@ Result<Call> read_call(const std::vector<std::string>& words) {
     call.layer_bytes = 0;
     if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
   }
-  const bool sets_sync = std::ranges::any_of(
-      read->all("--set"), [](const std::string& assignment) { return assignment.starts_with("run.sync"); });
+  const bool sets_sync =
+      std::ranges::any_of(read->all("--set"), [](const std::string& assignment) { return assignment.starts_with("run.sync"); });
   call.names_sync = read->has("--sync") || is_named(planned, "run.sync") || sets_sync || spec.find("--sync") == nullptr;
   if (spec.find("--layer") != nullptr) {
     call.layer_mm = planned.layer_mm;

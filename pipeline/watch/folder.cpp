@@ -207,8 +207,8 @@ bool Folder::is_complete(const std::string& relative, double settle_seconds, con
     file.end_read_at = Clock::now();
   }
   const bool renamed = file.arrival == WatchedFile::Arrival::kRenamed;
-  const bool complete = file.end->content != FileEnd::Content::kMissing &&
-                        (settled || renamed || file.end->content == FileEnd::Content::kStated);
+  const bool complete =
+      file.end->content != FileEnd::Content::kMissing && (settled || renamed || file.end->content == FileEnd::Content::kStated);
   file.has_writer = complete && has_writer(path_of(relative)) == true;
   return complete && !file.has_writer;
 }

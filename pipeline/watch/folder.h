@@ -33,7 +33,7 @@ struct WatchedFile {
   bool writer_checked = false;  // for this stamp, without an event
   std::optional<FileEnd> end;   // of this stamp, if it was read
   std::chrono::steady_clock::time_point end_read_at;
-  bool has_writer = false;      // would be complete, but a process has it open for writing
+  bool has_writer = false;  // would be complete, but a process has it open for writing
 };
 
 class Folder {

@@ -187,12 +187,14 @@ Status end_job(WatchShared& shared, WatchTask& task) {
       const std::lock_guard lock(shared.mutex);
       if (!recorded(task, shared.record->then(job))) return {};
     }
+    task.in_command = true;
     const auto code = run_shell(job.then,
                                 {{"LAMINA_OUTPUT", job.result.code == 0 ? full_path(result_path(job)) : ""},
                                  {"LAMINA_PART", full_path(job.now)},
                                  {"LAMINA_CODE", std::to_string(job.result.code)},
                                  {"LAMINA_ERROR", job.result.reason}},
-                                task.cancel);
+                                shared.then_limit_seconds, task.cancel);
+    task.in_command = false;
     if (!code) return code.error();
     if (!*code) return {};  // stopped: it runs again
     task.then_code = **code;

@@ -16,7 +16,8 @@ namespace lamina::pipeline {
 struct WatchShared {
   std::string folder, done, failed;  // watched; of planned files
   RunJob run;
-  std::mutex mutex;  // guards what follows, and names of results
+  double then_limit_seconds = 0;  // 0: none
+  std::mutex mutex;               // guards what follows, and names of results
   std::optional<WatchRecord> record;
   std::map<std::string, std::set<std::string>> used;  // by which jobs each file is read (Candidates)
   std::set<std::string> moving;                       // jobs that use nothing any more
@@ -27,7 +28,7 @@ struct WatchTask {
   WatchedJob job;
   BatchJob call;                 // command line; empty if the job is planned already
   std::uint64_t need_bytes = 0;  // expected peak memory
-  std::atomic<bool> cancel{false};
+  std::atomic<bool> cancel{false}, in_command{false};
   // --- results
   enum class End {
     kEnded,    // recorded as ended

@@ -19,6 +19,7 @@
 
 #include "pipeline/batch/queue.h"
 #include "pipeline/job/errors.h"
+#include "pipeline/watch/after_job.h"
 #include "pipeline/watch/candidates.h"
 #include "pipeline/watch/folder.h"
 #include "pipeline/watch/moves.h"
@@ -82,6 +83,7 @@ class FolderWatcher {
     shared.done = std::move(done);
     shared.failed = std::move(failed);
     shared.run = run;
+    shared.then_limit_seconds = options_.then_limit_seconds;
     running_->wake = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     ::malloc_trim(0);  // once while there is one thread, as in a batch
     for (WatchedJob& job : record.take_unfinished()) add_unfinished(std::move(job));
@@ -245,8 +247,13 @@ class FolderWatcher {
     summary_.interrupted = interrupt;
     for (const auto& task : tasks_) task->cancel = true;
     std::unique_lock lock(running_->shared.mutex);
-    running_->changed.wait_for(lock, kLastGrace, [&] { return running_->ended.size() == tasks_.size(); });
-    summary_.abandoned = running_->ended.size() != tasks_.size();
+    const auto all_ended = [&] { return running_->ended.size() == tasks_.size(); };
+    const auto commands_ended = [&] {
+      return all_ended() || std::ranges::none_of(tasks_, [](const auto& task) { return task->in_command.load(); });
+    };
+    if (!running_->changed.wait_for(lock, kLastGrace, all_ended))
+      running_->changed.wait_for(lock, kKillAfter + kLastGrace, commands_ended);
+    summary_.abandoned = !all_ended();
   }
 
   const WatchOptions& options_;

@@ -457,6 +457,27 @@ TEST_F(WatchedFolder, UnfinishedWorkOfAPartThatIsGoneIsRemoved) {
   EXPECT_FALSE(has("out/.watch"));
 }
 
+TEST_F(WatchedFolder, ACommandAfterAJobEndsAtItsTimeLimitOrAtAStopEvenIfItIgnoresSignals) {
+  const std::string waits = "echo $$ > then.txt; while test ! -e go; do sleep 0.1; done";
+  const auto still_runs = [&] { return ::kill(static_cast<pid_t>(std::stol(read_text(directory_ / "then.txt"))), 0) == 0; };
+  put_box("in/a.stl");
+  Outcome outcome = watch({"--then", waits, "--then-limit", "0.1"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.err.find("a.stl: --then ended with exit code 124 (time limit)"), std::string::npos) << outcome.err;
+  EXPECT_EQ(events("ended").at(0)["then_code"], 124);
+  EXPECT_FALSE(still_runs());
+  fs::remove(directory_ / "then.txt");
+  put_box("in/b.stl");
+  outcome = watch({"--then", "trap '' TERM; " + waits, "--then-limit", "0"}, [&](int process) {
+    EXPECT_TRUE(wait_for("then.txt"));
+    ::kill(process, SIGTERM);
+  });
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(events("ended").size(), 1u);
+  EXPECT_FALSE(still_runs());
+  write_text(directory_ / "go", "");
+}
+
 TEST_F(WatchedFolder, AStopInterruptsACommandAfterAJobAndRunsItAgain) {
   put_box("in/a.stl");
   const Words slow = {"--then", "echo x >> then.txt; test -e go || sleep 1000"};
