@@ -162,7 +162,7 @@ Status move_inputs(WatchShared& shared, WatchedJob& job) {
     }
     const Result<std::optional<std::string>> moved = move_input(path_in(shared, input), input, to);
     if (!moved) return moved.error();
-    if (i == 0 && *moved) job.now = **moved;
+    if (i == 0) job.now = *moved ? **moved : find_moved(input, to).value_or("");
   }
   if (job.now.empty()) job.now = path_in(shared, job.inputs.front());
   return {};
