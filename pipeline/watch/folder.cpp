@@ -13,7 +13,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
 #include <memory>
+#include <thread>
 #include <utility>
 
 #include "pipeline/job/errors.h"
@@ -23,6 +25,7 @@
 namespace lamina::pipeline {
 namespace {
 
+namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kReadAgainAfter{1};  // of a file that could not be read
@@ -50,6 +53,44 @@ std::optional<bool> has_writer(const std::string& path) {
   return leased || refused ? std::optional(refused) : std::nullopt;
 }
 
+/// Whether another process has a lock that excludes this one; watchers that start have some for an instant.
+bool is_refused(int folder, int lock) {
+  for (int attempt = 0; attempt < 20; ++attempt) {
+    if (::flock(folder, lock | LOCK_NB) == 0 || errno != EWOULDBLOCK) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
+bool is_watched(const fs::path& folder) {
+  const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool refused = is_refused(file, LOCK_SH);
+  ::close(file);
+  return refused;
+}
+
+/// A watched folder above or below; "" if there is none. Hidden folders have watchers of their own. Two watchers that start
+/// at once may both find the other one: each has locked its folder.
+std::string nested_watch(const std::string& root) {
+  std::error_code error, gone;
+  const fs::path own = fs::canonical(root, error);
+  for (fs::path at = own; at.has_relative_path() && !at.filename().string().starts_with('.');) {
+    at = at.parent_path();
+    if (is_watched(at)) return at.string();
+  }
+  constexpr auto kOptions = fs::directory_options::skip_permission_denied;
+  for (fs::recursive_directory_iterator at(own, kOptions, error), end; !error && at != end; at.increment(error)) {
+    if (!fs::is_directory(at->symlink_status(gone))) continue;
+    if (at->path().filename().string().starts_with('.')) {
+      at.disable_recursion_pending();
+    } else if (is_watched(at->path())) {
+      return at->path().string();
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string joined(const std::string& folder, const std::string& name) {
@@ -71,8 +112,11 @@ Result<Folder> Folder::open(const std::string& root, std::vector<std::string> sk
     return usage("{}: {}; name the folder that is to be watched", root,
                  errno == ENOTDIR ? "is a file, not a folder" : std::strerror(errno));
   // File systems that cannot lock a folder have one watcher by agreement.
-  if (::flock(folder.held_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+  if (is_refused(folder.held_, LOCK_EX))
     return failure(Fault::kOutput, "{}: another watcher has this folder right now; stop it, or name another folder", root);
+  if (const std::string other = nested_watch(root); !other.empty())
+    return usage("{}: another watcher has {}, and their files would be planned twice; stop it, or name a folder next to it",
+                 root, other);
   std::signal(SIGIO, SIG_IGN);  // of has_writer()
   folder.events_ = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
   if (folder.events_ < 0)

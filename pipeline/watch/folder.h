@@ -40,7 +40,8 @@ class Folder {
  public:
   /// root     as given by the caller
   /// skipped  folders below it whose files do not count, relative to it
-  /// errors   kUsage: missing or no folder. kOutput: another process holds it
+  /// errors   kUsage: missing or no folder, or a folder above or below is watched. kOutput: another process holds it
+  /// cost     reads all folders below it
   static Result<Folder> open(const std::string& root, std::vector<std::string> skipped);
   Folder(Folder&& other) noexcept;
   Folder& operator=(Folder&&) = delete;

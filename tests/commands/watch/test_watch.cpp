@@ -328,6 +328,7 @@ TEST_F(WatchedFolder, WrongUseIsRefusedWithOneLine) {
 }
 
 TEST_F(WatchedFolder, ARunningWatcherPlansWhatComesAndEndsWithItsSignal) {
+  fs::create_directories(directory_ / "next");
   for (const int signal : {SIGTERM, SIGINT}) {
     const std::string name = signal == SIGTERM ? "a" : "b";
     const Outcome outcome = watch({}, [&](int process) {
@@ -337,7 +338,9 @@ TEST_F(WatchedFolder, ARunningWatcherPlansWhatComesAndEndsWithItsSignal) {
       EXPECT_TRUE(wait_for("in/done/" + name + ".stl"));
       // Neither the folder nor the output takes a second watcher.
       EXPECT_EQ(run_lamina({"watch", "in", "-o", "other", "--once"}, directory_.path()).code, 4);
-      EXPECT_EQ(run_lamina({"watch", "in/sub", "-o", "out", "--once"}, directory_.path()).code, 4);
+      EXPECT_EQ(run_lamina({"watch", "next", "-o", "out", "--once"}, directory_.path()).code, 4);
+      EXPECT_EQ(run_lamina({"watch", "next", "-o", "other", "--once"}, directory_.path()).code, 0);
+      EXPECT_EQ(run_lamina({"watch", "in/sub", "-o", "other", "--once"}, directory_.path()).code, 2);
       fs::create_directories(directory_ / ("in/later-" + name));
       put_box("in/later-" + name + "/c.stl");
       EXPECT_TRUE(wait_for("in/done/later-" + name + "/c.stl"));

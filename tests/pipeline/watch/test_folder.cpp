@@ -76,8 +76,10 @@ TEST_F(FilesOfAFolder, AreCompleteAtOnceEvenIfTheyCameBeforeTheEventsOfTheirFold
   put_box("sub/a.stl");
   if (!has_leases("sub/a.stl")) GTEST_SKIP() << "a file system without leases";
   EXPECT_TRUE(complete("sub/a.stl"));
-  std::ofstream open(directory_ / "sub/a.stl", std::ios::binary | std::ios::in);
-  Folder other = std::move(*Folder::open(directory_ / "sub", {}));
+  const test::Directory next;
+  fs::copy_file(directory_ / "sub/a.stl", next / "a.stl");
+  std::ofstream open(next / "a.stl", std::ios::binary | std::ios::in);
+  Folder other = std::move(*Folder::open(next.path().string(), {}));
   EXPECT_TRUE(other.scan().ok());
   EXPECT_FALSE(other.is_complete("a.stl", 1000, kNoStop));
   open.close();
@@ -134,6 +136,24 @@ TEST_F(FilesOfAFolder, AreReadAgainAfterAnErrorWithoutAChange) {
   EXPECT_FALSE(complete("a.stl", 0));  // not at once: there is no busy loop
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));
   EXPECT_TRUE(complete("a.stl", 0));
+}
+
+TEST_F(FilesOfAFolder, HaveOneWatcherAlsoInFoldersAboveAndBelow) {
+  for (const char* folder : {"a/b/c", "a/next", "a/.hidden/d"}) fs::create_directories(directory_ / folder);
+  const auto fault = [](const std::string& root) {
+    const auto folder = Folder::open(root, {});
+    return folder ? Fault::kInterrupted : folder.error().fault;
+  };
+  EXPECT_EQ(fault(directory_ / "a"), Fault::kUsage);
+  EXPECT_EQ(fault(directory_.path()), Fault::kOutput);
+  const test::Directory root;
+  for (const char* folder : {"a/b/c", "a/next", "a/.hidden/d"}) fs::create_directories(root / folder);
+  {
+    const auto watched = Folder::open(root / "a/b", {}), hidden = Folder::open(root / "a/.hidden/d", {});
+    for (const auto& folder : {root / "a", root.path().string(), root / "a/b/c"}) EXPECT_EQ(fault(folder), Fault::kUsage);
+    EXPECT_EQ(fault(root / "a/next"), Fault::kInterrupted);  // no fault
+  }
+  EXPECT_EQ(fault(root / "a"), Fault::kInterrupted);
 }
 
 TEST_F(FilesOfAFolder, OfOtherFormatsAreCompleteAfterATimeWithoutAChange) {
