@@ -129,6 +129,7 @@ Folder::Folder(Folder&& other) noexcept
       skipped_(std::move(other.skipped_)),
       problems_(std::move(other.problems_)),
       reported_(std::move(other.reported_)),
+      found_(std::move(other.found_)),
       events_(std::exchange(other.events_, -1)),
       held_(std::exchange(other.held_, -1)),
       folders_(std::move(other.folders_)),
@@ -144,9 +145,7 @@ Folder::~Folder() {
 std::string Folder::path_of(const std::string& relative) const { return joined(root_, relative); }
 
 void Folder::report(std::string problem) {
-  if (std::ranges::find(reported_, problem) != reported_.end()) return;
-  reported_.push_back(problem);
-  problems_.push_back(std::move(problem));
+  if (found_.insert(problem).second && !reported_.contains(problem)) problems_.push_back(std::move(problem));
 }
 
 std::vector<std::string> Folder::take_problems() { return std::exchange(problems_, {}); }
@@ -233,6 +232,7 @@ Status Folder::scan() {
   if (!read_folder("", found)) return failure(Fault::kInput, "{}: {}; waiting for the folder", root_, std::strerror(errno));
   files_ = std::move(found);
   changes_.clear();
+  reported_ = std::exchange(found_, {});
   return {};
 }
 

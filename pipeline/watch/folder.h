@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -60,7 +61,7 @@ class Folder {
   Status scan();
   /// By their names relative to the folder.
   std::map<std::string, WatchedFile>& files() { return files_; }
-  /// One line for each folder that cannot be read, and if events are missing; each once.
+  /// One line for each folder that cannot be read, and if events are missing; each once while it lasts.
   std::vector<std::string> take_problems();
 
   /// Whether the file has all of its content: it has the length that it states, and was closed, renamed or unchanged for
@@ -80,7 +81,8 @@ class Folder {
   void report(std::string problem);
 
   std::string root_;
-  std::vector<std::string> skipped_, problems_, reported_;
+  std::vector<std::string> skipped_, problems_;
+  std::set<std::string> reported_, found_;  // problems up to the last scan, and since then
   int events_ = -1, held_ = -1;
   std::map<int, std::string> folders_;    // of watch descriptors, relative
   std::map<std::string, Event> changes_;  // since the last scan

@@ -223,6 +223,7 @@ class FolderWatcher {
       return waiting_.push_back({task, Clock::now() + kRetryAfter});
     }
     active_.erase(task->job.part);
+    problems_.erase(task->job.part);
     if (task->end != End::kEnded) return;
     const int code = task->job.result.code;
     ++(code == 0 ? summary_.done : summary_.failed);

@@ -447,6 +447,23 @@ TEST_F(WatchedFolder, EveryStepOfAKilledWatcherIsContinued) {
   }
 }
 
+TEST_F(WatchedFolder, ALongRecordIsReplacedByWhatIsUnfinished) {
+  put_box("in/a.stl");
+  put_box("in/b.stl");
+  ASSERT_EQ(watch({"--then", "echo x >> then.txt"}).code, 0);
+  std::string record = read_text(directory_ / "out/watch.jsonl");
+  record.resize(record.rfind("{\"event\":\"ended\""));  // killed within the command
+  record.insert(0, std::string(17 << 20, 'x') + "\n");
+  write_text(directory_ / "out/watch.jsonl", record);
+  write_text(directory_ / "out/watch.jsonl.part", "of a kill");
+  EXPECT_EQ(watch().code, 0);
+  EXPECT_EQ(read_text(directory_ / "then.txt"), "x\nx\nx\n");
+  EXPECT_EQ(read_text(directory_ / "out/watch.old.jsonl"), record);
+  EXPECT_EQ(events("begun").size() + events("planned").size() + events("moved").size(), 3u);
+  EXPECT_EQ(events("ended").size(), 1u);
+  EXPECT_FALSE(has("out/watch.jsonl.part"));
+}
+
 TEST_F(WatchedFolder, UnfinishedWorkOfAPartThatIsGoneIsRemoved) {
   put_box("in/a.stl", 12);
   EXPECT_EQ(watch({"--with", "jet --bed 20x20 --dpi 1200 --layer 0.005"},
