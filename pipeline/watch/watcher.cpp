@@ -83,6 +83,7 @@ class FolderWatcher {
     shared.done = std::move(done);
     shared.failed = std::move(failed);
     shared.run = run;
+    shared.time_limit_seconds = options_.time_limit_seconds;
     shared.then_limit_seconds = options_.then_limit_seconds;
     running_->wake = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     ::malloc_trim(0);  // once while there is one thread, as in a batch
@@ -113,6 +114,10 @@ class FolderWatcher {
   }
 
   void wait() {
+    for (const auto& task : tasks_) {
+      const std::chrono::duration<double> time = Clock::now() - task->begun;
+      if (options_.time_limit_seconds > 0 && time.count() > options_.time_limit_seconds) task->cancel = true;
+    }
     std::array<pollfd, 2> sources = {pollfd{folder_.events(), POLLIN, 0}, pollfd{running_->wake, POLLIN, 0}};
     ::poll(sources.data(), sources.size(), static_cast<int>(kTick.count()));
     std::uint64_t count = 0;
@@ -190,6 +195,7 @@ class FolderWatcher {
 
   // Threads are detached: a job that ignores its stop must not keep the watcher from ending.
   void start(std::shared_ptr<WatchTask> task) {
+    task->begun = Clock::now();
     need_ += task->need_bytes;
     tasks_.insert(task);
     std::thread([running = running_, task = std::move(task)] {
@@ -246,7 +252,10 @@ class FolderWatcher {
 
   void stop(const std::atomic<bool>& interrupt) {
     summary_.interrupted = interrupt;
-    for (const auto& task : tasks_) task->cancel = true;
+    for (const auto& task : tasks_) {
+      task->stop = true;  // first: a job that is cancelled without it has exceeded its time limit
+      task->cancel = true;
+    }
     std::unique_lock lock(running_->shared.mutex);
     const auto all_ended = [&] { return running_->ended.size() == tasks_.size(); };
     const auto commands_ended = [&] {

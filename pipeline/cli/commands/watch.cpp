@@ -41,6 +41,7 @@ CommandSpec watch_spec() {
       {"--failed", "FOLDER", "folder for parts that failed; default: FOLDER/failed", "", "Files"},
       {"--jobs", "N", "max number of concurrent jobs; 0: one per processor", "0", "Run"},
       {"--memory", "SIZE", "memory limit of all running jobs: 512M, 4G", "1G", "Run"},
+      {"--time-limit", "SECONDS", "time limit per job in seconds; slower jobs fail with exit code 3", "", "Run"},
       {"--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off", "job", "Run", sync->words()},
       {"--json", "", "print one JSON object on stdout for each ended job", "", "Run"},
       {"--quiet", "", "print errors only", "", "Run"}};
@@ -73,6 +74,7 @@ Result<WatchOptions> read_watch_options(const Arguments& arguments) {
   for (const Status& status :
        {arguments.read("--jobs", {0, 1024}, options.jobs), arguments.read("--memory", read_bytes, options.memory_bytes),
         arguments.read("--settle", {0, 1e6, " s"}, options.settings.settle_seconds),
+        arguments.read("--time-limit", {0.001, 1e9, " s"}, options.time_limit_seconds),
         arguments.read("--then-limit", {0, 1e6, " s"}, options.then_limit_seconds),
         arguments.read("--poll", {0.01, 3600, " s"}, options.poll_seconds)}) {
     if (!status) return status.error();

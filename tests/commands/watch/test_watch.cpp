@@ -500,6 +500,17 @@ TEST_F(WatchedFolder, ACommandAfterAJobEndsAtItsTimeLimitOrAtAStopEvenIfItIgnore
   write_text(directory_ / "go", "");
 }
 
+TEST_F(WatchedFolder, AJobThatTakesTooLongFailsAndItsCommandRuns) {
+  put_box("in/a.stl", 12);
+  const Outcome outcome = watch({"--with", "jet --bed 20x20 --dpi 2400 --layer 0.001 --sync off", "--time-limit", "0.2",
+                                 "--then", "sleep 0.5; echo $LAMINA_CODE > then.txt"});
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_EQ(read_text(directory_ / "out/a.error.txt"), "took longer than its time limit of 0.2 s\n");
+  EXPECT_EQ(read_text(directory_ / "then.txt"), "3\n");
+  EXPECT_EQ(files_below(directory_ / "in"), Words{"failed/a.stl"});
+  EXPECT_FALSE(has("out/.watch"));
+}
+
 TEST_F(WatchedFolder, AStopInterruptsACommandAfterAJobAndRunsItAgain) {
   put_box("in/a.stl");
   const Words slow = {"--then", "echo x >> then.txt; test -e go || sleep 1000"};
