@@ -340,7 +340,7 @@ TEST_F(WatchedFolder, ARunningWatcherPlansWhatComesAndEndsWithItsSignal) {
       EXPECT_EQ(run_lamina({"watch", "in", "-o", "other", "--once"}, directory_.path()).code, 4);
       EXPECT_EQ(run_lamina({"watch", "next", "-o", "out", "--once"}, directory_.path()).code, 4);
       EXPECT_EQ(run_lamina({"watch", "next", "-o", "other", "--once"}, directory_.path()).code, 0);
-      EXPECT_EQ(run_lamina({"watch", "in/sub", "-o", "other", "--once"}, directory_.path()).code, 2);
+      EXPECT_EQ(run_lamina({"watch", "in/sub", "-o", "third", "--once"}, directory_.path()).code, 2);
       fs::create_directories(directory_ / ("in/later-" + name));
       put_box("in/later-" + name + "/c.stl");
       EXPECT_TRUE(wait_for("in/done/later-" + name + "/c.stl"));
