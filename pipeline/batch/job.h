@@ -112,6 +112,7 @@ struct BatchResult {
 struct Call {
   std::string output;               // "" if the command line names none
   bool output_of_job_file = false;  // relative to the working directory, not to the batch's directory
+  std::string side_output;          // option of another file that is written, with its text: "--quote prices.csv"
   /// Extension of the default output name, "" for a directory. Absent: the command only returns a value.
   std::optional<std::string> ending;
   bool can_continue = false, can_replace = false;  // output of an earlier run

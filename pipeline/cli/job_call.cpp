@@ -9,6 +9,7 @@
 
 #include "pipeline/cache/store.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/outputs.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"  // is_named
@@ -233,7 +234,9 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   call.parsed = packed(*line);
   call.inputs = read->operands;
   for (const auto& [flag, text] : read->options) {
-    if (flag.find("--output") == std::string::npos && !text.empty()) call.inputs.push_back(text);
+    if (flag.find("--output") != std::string::npos || text.empty()) continue;
+    call.inputs.push_back(text);
+    if (is_output_option(flag)) call.side_output = flag + " " + text;
   }
   if (read->operands.empty()) {
     for (const PartRequest& part : planned.parts) call.inputs.push_back(part.path);

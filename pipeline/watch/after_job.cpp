@@ -46,7 +46,7 @@ int start_shell(const std::string& command, const std::vector<std::string>& envi
 }  // namespace
 
 Result<std::optional<int>> run_shell(const std::string& command,
-                                     const std::vector<std::pair<std::string, std::string>>& variables,
+                                     const std::vector<std::pair<std::string, std::string>>& variables, double limit_seconds,
                                      const std::atomic<bool>& stop) {
   std::vector<std::string> environment;
   for (char** variable = environ; *variable != nullptr; ++variable) {
@@ -56,17 +56,33 @@ Result<std::optional<int>> run_shell(const std::string& command,
   pid_t process = 0;
   if (const int reason = start_shell(command, environment, process); reason != 0)
     return failure(Fault::kInternal, "/bin/sh: {}", std::strerror(reason));
-  bool stopped = false;
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
+  std::optional<Clock::time_point> kill_at;
+  bool stopped = false, ended = false;
   int status = 0;
-  for (pid_t ended = 0; (ended = ::waitpid(process, &status, WNOHANG)) != process;) {
-    if (ended < 0 && errno != EINTR) return failure(Fault::kInternal, "--then: {}", std::strerror(errno));
-    if (stop && !stopped) {
-      stopped = true;
+  // After SIGTERM the shell may end before the other processes of its group.
+  while (!ended || (kill_at && ::kill(-process, 0) == 0)) {
+    if (!ended) {
+      const pid_t found = ::waitpid(process, &status, WNOHANG);
+      if (found < 0 && errno != EINTR) return failure(Fault::kInternal, "--then: {}", std::strerror(errno));
+      ended = found == process;
+      if (ended) continue;
+    }
+    const auto now = Clock::now();
+    const bool overdue = limit_seconds > 0 && now - begin >= std::chrono::duration<double>(limit_seconds);
+    if (!kill_at && (stop || overdue)) {
+      stopped = stop;
+      kill_at = now + kKillAfter;
       ::kill(-process, SIGTERM);
+    } else if (kill_at && now >= *kill_at) {
+      ::kill(-process, SIGKILL);
+      if (ended) break;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   if (stopped) return std::optional<int>();
+  if (kill_at) return std::optional<int>(kThenOverdue);
   return std::optional<int>(WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status));
 }
 

@@ -78,9 +78,8 @@ bool Candidates::is_complete(const std::string& file) {
   }
   const WatchedFile& state = found->second;
   if (folder_.is_complete(file, settle, *stop_)) return true;
-  if (Folder::stays_incomplete(state, settle)) {
+  if (const std::string lacks = Folder::lack_of(state, settle); !lacks.empty()) {
     const std::string path = folder_.path_of(file);
-    const std::string& lacks = state.end->missing;
     waits(file, Fault::kInput,
           fmt::format("{}: incomplete: {}; waiting for the rest", path,
                       lacks.starts_with(path) ? lacks.substr(path.size() + 2) : lacks));
@@ -100,8 +99,8 @@ const Candidates::SettingsOfFolder& Candidates::settings_of(const std::string& f
     const double settle = found.settings.settle_seconds;
     if (!folder_.is_complete(file, settle, *stop_)) {
       found.valid = false;
-      if (Folder::stays_incomplete(state->second, settle)) {
-        waits(file, Fault::kUsage, folder_.path_of(file) + ": is empty or incomplete; its parts wait");
+      if (!Folder::lack_of(state->second, settle).empty()) {
+        waits(file, Fault::kUsage, folder_.path_of(file) + ": is empty or incomplete, or open for writing; its parts wait");
       } else {
         any_unsettled = true;
       }

@@ -20,9 +20,10 @@ constexpr std::uint64_t kStlHead = 84, kStlFacet = 50;  // bytes; source: stages
 constexpr std::uint64_t kZipEnd = 22, kMaxZipComment = 65535, kZip64Locator = 20;
 constexpr std::uint64_t kMaxGzipRatio = 200, kSmallExpansion = 64 << 20;  // as the loader, which refuses such files
 
-FileEnd missing(std::string what) { return {FileEnd::Content::kMissing, std::move(what)}; }
-FileEnd unstated() { return {FileEnd::Content::kUnstated, {}}; }
-FileEnd stated() { return {FileEnd::Content::kStated, {}}; }
+FileEnd missing(std::string what) { return {FileEnd::Content::kMissing, std::move(what), false}; }
+FileEnd unread(std::string why) { return {FileEnd::Content::kMissing, std::move(why), true}; }
+FileEnd unstated() { return {FileEnd::Content::kUnstated, {}, false}; }
+FileEnd stated() { return {FileEnd::Content::kStated, {}, false}; }
 
 /// A number of little-endian bytes.
 std::uint64_t number_at(std::string_view bytes, std::size_t at, std::size_t count) {
@@ -40,6 +41,7 @@ std::string tail_of(const FileReader& file, std::uint64_t count) {
 /// source  APPNOTE.TXT 6.3.10, 4.3.6 and 4.3.16: the end record has the position of the directory in front of it
 FileEnd zip_end(const FileReader& file) {
   const std::string tail = tail_of(file, kZipEnd + kMaxZipComment);
+  if (tail.empty()) return unread("cannot be read to its end");
   const std::string_view text = tail;
   for (std::size_t at = text.rfind("PK\x05\x06"); at != std::string_view::npos;
        at = at == 0 ? std::string_view::npos : text.rfind("PK\x05\x06", at - 1)) {
@@ -56,7 +58,7 @@ FileEnd zip_end(const FileReader& file) {
 /// A file of one member states its end; more members could follow those of a file of several.
 FileEnd gzip_end(const FileReader& file, const std::atomic<bool>& stop) {
   z_stream stream{};
-  if (inflateInit2(&stream, 16 + MAX_WBITS) != Z_OK) return missing("not enough memory to inflate it");
+  if (inflateInit2(&stream, 16 + MAX_WBITS) != Z_OK) return unread("not enough memory to inflate it");
   const std::unique_ptr<z_stream, int (*)(z_stream*)> ends(&stream, inflateEnd);
   std::string in(256 << 10, '\0'), out(256 << 10, '\0');
   int members = 0;
@@ -64,10 +66,10 @@ FileEnd gzip_end(const FileReader& file, const std::atomic<bool>& stop) {
   bool inside = true;
   // The last 8 bytes of a member are read after all of its output.
   for (std::uint64_t read = 0; read < file.size() || stream.avail_in > 0;) {
-    if (stop) return missing("not read");
+    if (stop) return unread("not read");
     if (stream.avail_in == 0) {
       in.resize(static_cast<std::size_t>(std::min<std::uint64_t>(in.size(), file.size() - read)));
-      if (!file.read_at(read, in)) return missing("changed while it was read");
+      if (!file.read_at(read, in)) return unread("cannot be read to its end");
       read += in.size();
       stream.next_in = reinterpret_cast<Bytef*>(in.data());
       stream.avail_in = static_cast<uInt>(in.size());
@@ -101,18 +103,20 @@ FileEnd stl_end(const FileReader& file, std::string_view head) {
     return file.size() < bytes ? missing(fmt::format("{} of {} bytes", file.size(), bytes)) : unstated();
   }
   if (start.find("solid") == std::string::npos && start.find("facet") == std::string::npos) return unstated();  // no STL
-  return lower_case(tail_of(file, 4096)).find("endsolid") == std::string::npos ? missing("no endsolid") : unstated();
+  const std::string tail = lower_case(tail_of(file, 4096));
+  if (tail.empty()) return unread("cannot be read to its end");
+  return tail.find("endsolid") == std::string::npos ? missing("no endsolid") : unstated();
 }
 
 }  // namespace
 
 FileEnd end_of_file(const std::string& path, const std::atomic<bool>& stop) {
   auto file = FileReader::open(path, {.fault = Fault::kInput});
-  if (!file) return missing(file.error().message);
+  if (!file) return unread(file.error().message);
   if (file->size() == 0) return missing("it is empty");
   std::array<char, 512> space;
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(space.size(), file->size()));
-  if (!file->read_at(0, {space.data(), count})) return missing("changed while it was read");
+  if (!file->read_at(0, {space.data(), count})) return unread("cannot be read to its end");
   const std::string_view head(space.data(), count);
   if (head.starts_with("PK\x03\x04") || head.starts_with("PK\x05\x06")) return zip_end(*file);
   if (head.starts_with("\x1f\x8b")) return gzip_end(*file, stop);

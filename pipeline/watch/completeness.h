@@ -15,6 +15,7 @@ struct FileEnd {
   };
   Content content = Content::kMissing;
   std::string missing;  // of an incomplete file: "5084 of 10084 bytes"
+  bool unread = false;  // it could not be read: that may change while the file does not
 };
 
 /// Detects the format from the content first, then from the name, as load::load() does. A damaged file may be whole.

@@ -13,7 +13,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
 #include <memory>
+#include <thread>
 #include <utility>
 
 #include "pipeline/job/errors.h"
@@ -23,8 +25,10 @@
 namespace lamina::pipeline {
 namespace {
 
+namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
+constexpr std::chrono::seconds kReadAgainAfter{1};  // of a file that could not be read
 constexpr std::uint32_t kEvents = IN_CLOSE_WRITE | IN_MOVED_TO | IN_MODIFY | IN_CREATE | IN_MOVED_FROM | IN_DELETE |
                                   IN_ONLYDIR | IN_DONT_FOLLOW | IN_EXCL_UNLINK;
 
@@ -37,15 +41,54 @@ bool is_watched_name(const std::string& name) {
   return !name.starts_with('.') && (is_toml_name(name) || load::is_part_name(name));
 }
 
-/// Whether the system states that no process has the file open for writing: on local file systems, for files of this user.
-/// A lease is refused while a writer has the file open; a writer that comes meanwhile waits for an instant.
-bool has_no_writer(const std::string& path) {
+/// Whether a process has the file open for writing; nothing if the system does not state it: it does on local file systems,
+/// for files of this user. A lease is refused while a writer has the file open; a writer that comes meanwhile waits for an
+/// instant.
+std::optional<bool> has_writer(const std::string& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-  if (file < 0) return false;
-  const bool leased = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0;
+  if (file < 0) return std::nullopt;
+  const bool leased = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0, refused = !leased && errno == EAGAIN;
   if (leased) ::fcntl(file, F_SETLEASE, F_UNLCK);
   ::close(file);
-  return leased;
+  return leased || refused ? std::optional(refused) : std::nullopt;
+}
+
+/// Whether another process has a lock that excludes this one; watchers that start have some for an instant.
+bool is_refused(int folder, int lock) {
+  for (int attempt = 0; attempt < 20; ++attempt) {
+    if (::flock(folder, lock | LOCK_NB) == 0 || errno != EWOULDBLOCK) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
+bool is_watched(const fs::path& folder) {
+  const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool refused = is_refused(file, LOCK_SH);
+  ::close(file);
+  return refused;
+}
+
+/// A watched folder above or below; "" if there is none. Hidden folders have watchers of their own. Two watchers that start
+/// at once may both find the other one: each has locked its folder.
+std::string nested_watch(const std::string& root) {
+  std::error_code error, gone;
+  const fs::path own = fs::canonical(root, error);
+  for (fs::path at = own; at.has_relative_path() && !at.filename().string().starts_with('.');) {
+    at = at.parent_path();
+    if (is_watched(at)) return at.string();
+  }
+  constexpr auto kOptions = fs::directory_options::skip_permission_denied;
+  for (fs::recursive_directory_iterator at(own, kOptions, error), end; !error && at != end; at.increment(error)) {
+    if (!fs::is_directory(at->symlink_status(gone))) continue;
+    if (at->path().filename().string().starts_with('.')) {
+      at.disable_recursion_pending();
+    } else if (is_watched(at->path())) {
+      return at->path().string();
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -69,9 +112,12 @@ Result<Folder> Folder::open(const std::string& root, std::vector<std::string> sk
     return usage("{}: {}; name the folder that is to be watched", root,
                  errno == ENOTDIR ? "is a file, not a folder" : std::strerror(errno));
   // File systems that cannot lock a folder have one watcher by agreement.
-  if (::flock(folder.held_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+  if (is_refused(folder.held_, LOCK_EX))
     return failure(Fault::kOutput, "{}: another watcher has this folder right now; stop it, or name another folder", root);
-  std::signal(SIGIO, SIG_IGN);  // of has_no_writer()
+  if (const std::string other = nested_watch(root); !other.empty())
+    return usage("{}: another watcher has {}, and their files would be planned twice; stop it, or name a folder next to it",
+                 root, other);
+  std::signal(SIGIO, SIG_IGN);  // of has_writer()
   folder.events_ = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
   if (folder.events_ < 0)
     folder.report(fmt::format("no events of the system ({}); the folder is polled", std::strerror(errno)));
@@ -83,6 +129,7 @@ Folder::Folder(Folder&& other) noexcept
       skipped_(std::move(other.skipped_)),
       problems_(std::move(other.problems_)),
       reported_(std::move(other.reported_)),
+      found_(std::move(other.found_)),
       events_(std::exchange(other.events_, -1)),
       held_(std::exchange(other.held_, -1)),
       folders_(std::move(other.folders_)),
@@ -98,9 +145,7 @@ Folder::~Folder() {
 std::string Folder::path_of(const std::string& relative) const { return joined(root_, relative); }
 
 void Folder::report(std::string problem) {
-  if (std::ranges::find(reported_, problem) != reported_.end()) return;
-  reported_.push_back(problem);
-  problems_.push_back(std::move(problem));
+  if (found_.insert(problem).second && !reported_.contains(problem)) problems_.push_back(std::move(problem));
 }
 
 std::vector<std::string> Folder::take_problems() { return std::exchange(problems_, {}); }
@@ -151,7 +196,7 @@ void Folder::take_file(const std::string& relative, std::map<std::string, Watche
   const auto change = changes_.find(relative);
   const bool has_event = change != changes_.end();
   if (known == files_.end() || !(file.stamp == *stamp) || (has_event && change->second == Event::kChanged)) {
-    file = {*stamp, WatchedFile::Arrival::kUnknown, Clock::now(), false, {}};
+    file = {*stamp, WatchedFile::Arrival::kUnknown, Clock::now(), false, {}, {}, false};
   }
   if (!has_event || change->second == Event::kChanged) return;
   file.end.reset();
@@ -187,6 +232,7 @@ Status Folder::scan() {
   if (!read_folder("", found)) return failure(Fault::kInput, "{}: {}; waiting for the folder", root_, std::strerror(errno));
   files_ = std::move(found);
   changes_.clear();
+  reported_ = std::exchange(found_, {});
   return {};
 }
 
@@ -197,18 +243,23 @@ bool Folder::is_complete(const std::string& relative, double settle_seconds, con
   const bool settled = Clock::now() - file.unchanged_since >= std::chrono::duration<double>(settle_seconds);
   if (!settled && file.arrival == WatchedFile::Arrival::kUnknown) {
     // It may have been closed before its folder had events. A writer that has it open will close it.
-    if (std::exchange(file.writer_checked, true) || !has_no_writer(path_of(relative))) return false;
+    if (std::exchange(file.writer_checked, true) || has_writer(path_of(relative)) != false) return false;
     file.arrival = WatchedFile::Arrival::kClosed;
   }
-  if (!file.end) file.end = end_of_file(path_of(relative), stop);
+  if (!file.end || (file.end->unread && Clock::now() - file.end_read_at >= kReadAgainAfter)) {
+    file.end = end_of_file(path_of(relative), stop);
+    file.end_read_at = Clock::now();
+  }
   const bool renamed = file.arrival == WatchedFile::Arrival::kRenamed;
-  return file.end->content != FileEnd::Content::kMissing &&
-         (settled || renamed || file.end->content == FileEnd::Content::kStated);
+  const bool complete =
+      file.end->content != FileEnd::Content::kMissing && (settled || renamed || file.end->content == FileEnd::Content::kStated);
+  file.has_writer = complete && has_writer(path_of(relative)) == true;
+  return complete && !file.has_writer;
 }
 
-bool Folder::stays_incomplete(const WatchedFile& file, double settle_seconds) {
-  return file.end && file.end->content == FileEnd::Content::kMissing &&
-         Clock::now() - file.unchanged_since >= std::chrono::duration<double>(settle_seconds);
+std::string Folder::lack_of(const WatchedFile& file, double settle_seconds) {
+  if (!file.end || Clock::now() - file.unchanged_since < std::chrono::duration<double>(settle_seconds)) return {};
+  return file.has_writer ? "a program has it open for writing" : file.end->missing;
 }
 
 }  // namespace lamina::pipeline

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,13 +33,16 @@ struct WatchedFile {
   std::chrono::steady_clock::time_point unchanged_since;
   bool writer_checked = false;  // for this stamp, without an event
   std::optional<FileEnd> end;   // of this stamp, if it was read
+  std::chrono::steady_clock::time_point end_read_at;
+  bool has_writer = false;  // would be complete, but a process has it open for writing
 };
 
 class Folder {
  public:
   /// root     as given by the caller
   /// skipped  folders below it whose files do not count, relative to it
-  /// errors   kUsage: missing or no folder. kOutput: another process holds it
+  /// errors   kUsage: missing or no folder, or a folder above or below is watched. kOutput: another process holds it
+  /// cost     reads all folders below it
   static Result<Folder> open(const std::string& root, std::vector<std::string> skipped);
   Folder(Folder&& other) noexcept;
   Folder& operator=(Folder&&) = delete;
@@ -57,15 +61,16 @@ class Folder {
   Status scan();
   /// By their names relative to the folder.
   std::map<std::string, WatchedFile>& files() { return files_; }
-  /// One line for each folder that cannot be read, and if events are missing; each once.
+  /// One line for each folder that cannot be read, and if events are missing; each once while it lasts.
   std::vector<std::string> take_problems();
 
   /// Whether the file has all of its content: it has the length that it states, and was closed, renamed or unchanged for
-  /// `settle_seconds`; or it states none, nothing is missing, and it was renamed or unchanged for so long.
-  /// cost  of end_of_file(), once for each change
+  /// `settle_seconds`; or it states none, nothing is missing, and it was renamed or unchanged for so long. No process has it
+  /// open for writing, where the system states that.
+  /// cost  of end_of_file(), once for each change; of a file that cannot be read, once a second
   bool is_complete(const std::string& relative, double settle_seconds, const std::atomic<bool>& stop);
-  /// Whether the file is unchanged for so long, and incomplete. Only after is_complete().
-  static bool stays_incomplete(const WatchedFile& file, double settle_seconds);
+  /// What a file lacks that is unchanged for so long; "" if nothing. Only after is_complete().
+  static std::string lack_of(const WatchedFile& file, double settle_seconds);
 
  private:
   enum class Event { kChanged, kClosed, kRenamed };
@@ -76,7 +81,8 @@ class Folder {
   void report(std::string problem);
 
   std::string root_;
-  std::vector<std::string> skipped_, problems_, reported_;
+  std::vector<std::string> skipped_, problems_;
+  std::set<std::string> reported_, found_;  // problems up to the last scan, and since then
   int events_ = -1, held_ = -1;
   std::map<int, std::string> folders_;    // of watch descriptors, relative
   std::map<std::string, Event> changes_;  // since the last scan

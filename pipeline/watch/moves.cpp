@@ -135,6 +135,20 @@ Result<std::optional<std::string>> move_input(const std::string& from, const Wat
   }
 }
 
+std::optional<std::string> find_moved(const WatchedInput& input, const std::string& folder) {
+  const std::string ending = endings_of(input.path),
+                    stem = joined(folder, input.path.substr(0, input.path.size() - ending.size()));
+  std::optional<std::string> found;
+  for (int number = 1;; ++number) {
+    const std::string path = numbered(stem, number) + ending;
+    const auto stamp = stamp_of(path);
+    if (stamp == input.stamp) return path;
+    if (!stamp && !exists(path)) return found;
+    // A copy on another file system has a stamp of its own.
+    if (const auto digest = digest_file(path, input.stamp.bytes); digest && digest->hash == input.hash) found = path;
+  }
+}
+
 void choose_stem(WatchedJob& job) {
   const std::string stem = folder_stem(job.root, job.name);
   const std::string base = fs::path(job.name).filename().string();

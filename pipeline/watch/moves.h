@@ -19,6 +19,9 @@ std::string endings_of(const std::string& path);
 /// errors   kOutput with the system's reason
 Result<std::optional<std::string>> move_input(const std::string& from, const WatchedInput& input, const std::string& folder);
 
+/// Where an earlier run moved an input to, by its stamp, else by its content; nothing if it is not in the folder.
+std::optional<std::string> find_moved(const WatchedInput& input, const std::string& folder);
+
 /// A free name for the result of a job, or for its error: root/NAME, else NAME-2, ... Sets job.stem.
 void choose_stem(WatchedJob& job);
 

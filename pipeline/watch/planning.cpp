@@ -127,10 +127,12 @@ bool plan(WatchShared& shared, WatchTask& task) {
   } else {
     run_command_of(shared, task);
   }
-  if (task.cancel && job.result.code != 0) {
+  if (task.stop && job.result.code != 0) {
     task.end = End::kStopped;
     return false;
   }
+  if (task.cancel && job.result.code != 0)
+    fail(job, {Fault::kInput, fmt::format("took longer than its time limit of {} s", shared.time_limit_seconds)});
   const bool unchanged = are_unchanged(shared, job, true);
   const std::lock_guard lock(shared.mutex);
   if (!unchanged) {
@@ -162,7 +164,7 @@ Status move_inputs(WatchShared& shared, WatchedJob& job) {
     }
     const Result<std::optional<std::string>> moved = move_input(path_in(shared, input), input, to);
     if (!moved) return moved.error();
-    if (i == 0 && *moved) job.now = **moved;
+    if (i == 0) job.now = *moved ? **moved : find_moved(input, to).value_or("");
   }
   if (job.now.empty()) job.now = path_in(shared, job.inputs.front());
   return {};
@@ -187,12 +189,14 @@ Status end_job(WatchShared& shared, WatchTask& task) {
       const std::lock_guard lock(shared.mutex);
       if (!recorded(task, shared.record->then(job))) return {};
     }
+    task.in_command = true;
     const auto code = run_shell(job.then,
                                 {{"LAMINA_OUTPUT", job.result.code == 0 ? full_path(result_path(job)) : ""},
                                  {"LAMINA_PART", full_path(job.now)},
                                  {"LAMINA_CODE", std::to_string(job.result.code)},
                                  {"LAMINA_ERROR", job.result.reason}},
-                                task.cancel);
+                                shared.then_limit_seconds, task.stop);
+    task.in_command = false;
     if (!code) return code.error();
     if (!*code) return {};  // stopped: it runs again
     task.then_code = **code;
@@ -255,10 +259,10 @@ void run_task(WatchShared& shared, WatchTask& task, const std::function<void()>&
     if (!plan(shared, task)) return;
     planned();
   }
-  task.end = task.cancel ? End::kStopped : End::kRetry;
-  if (task.cancel) return;
+  task.end = task.stop ? End::kStopped : End::kRetry;
+  if (task.stop) return;
   if (const Status status = end_job(shared, task); !status) task.problem = status.error();
-  if (task.end != End::kEnded && task.cancel) task.end = End::kStopped;
+  if (task.end != End::kEnded && task.stop) task.end = End::kStopped;
 }
 
 }  // namespace lamina::pipeline

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -16,7 +17,8 @@ namespace lamina::pipeline {
 struct WatchShared {
   std::string folder, done, failed;  // watched; of planned files
   RunJob run;
-  std::mutex mutex;  // guards what follows, and names of results
+  double time_limit_seconds = 0, then_limit_seconds = 0;  // 0: none
+  std::mutex mutex;                                       // guards what follows, and names of results
   std::optional<WatchRecord> record;
   std::map<std::string, std::set<std::string>> used;  // by which jobs each file is read (Candidates)
   std::set<std::string> moving;                       // jobs that use nothing any more
@@ -27,7 +29,9 @@ struct WatchTask {
   WatchedJob job;
   BatchJob call;                 // command line; empty if the job is planned already
   std::uint64_t need_bytes = 0;  // expected peak memory
-  std::atomic<bool> cancel{false};
+  std::chrono::steady_clock::time_point begun;
+  std::atomic<bool> cancel{false}, stop{false};  // the planning, after its time limit; all, with the watcher, which sets both
+  std::atomic<bool> in_command{false};
   // --- results
   enum class End {
     kEnded,    // recorded as ended

@@ -21,6 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::uintmax_t kMaxBytes = 16 << 20;  // of a record that is continued as it is
+
 /// UTC, with milliseconds: "2026-11-30T16:25:12.345Z".
 std::string time_text() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -75,9 +77,23 @@ Result<WatchRecord> WatchRecord::open(const std::string& directory, const std::s
   const std::string folder = fs::weakly_canonical(root, error).string();
   if (!record.folder_.empty() && record.folder_ != folder)
     return usage("{}: belongs to the watched folder {}; name another directory with -o", path, one_line(record.folder_));
-  const Json started = {{"event", "started"}, {"time", time_text()}, {"folder", folder}, {"version", version()}};
-  if (Status status = record.journal_.append(json_line(started)); !status) return status.error();
+  const std::string started =
+      json_line({{"event", "started"}, {"time", time_text()}, {"folder", folder}, {"version", version()}});
+  if (fs::file_size(path, error) > kMaxBytes &&
+      record.journal_.replace(started + record.unfinished_lines(), (fs::path(directory) / "watch.old.jsonl").string()))
+    return record;
+  if (Status status = record.journal_.append(started); !status) return status.error();
   return record;
+}
+
+std::string WatchRecord::unfinished_lines() const {
+  std::string lines;
+  for (const std::string& id : order_) {
+    const WatchedJob& job = jobs_.at(id);
+    const auto work = begun_work_.find(job.part);
+    if (job.planned || (work != begun_work_.end() && work->second == job.work)) lines += lines_.at(id);
+  }
+  return lines;
 }
 
 /// A line that a kill has torn is skipped.
@@ -97,11 +113,13 @@ void WatchRecord::read_line(const std::string& line) try {
     begun_work_[job.part] = job.work;
     if (!jobs_.contains(id)) order_.push_back(id);
     jobs_[id] = std::move(job);
+    lines_[id] = line + "\n";
     return;
   }
   const auto found = jobs_.find(id);
   if (found == jobs_.end()) return;
   WatchedJob& job = found->second;
+  lines_[id] += line + "\n";
   if (event == "planned") {
     job.result.code = json.at("code").get<int>();
     job.result.reason = json.at("reason").text();
@@ -114,6 +132,7 @@ void WatchRecord::read_line(const std::string& line) try {
     job.moved = true;
   } else if (event == "ended" || event == "dropped") {
     jobs_.erase(found);
+    lines_.erase(id);
     std::erase(order_, id);
   }
 } catch (const JsonError&) {
@@ -127,6 +146,7 @@ std::vector<WatchedJob> WatchRecord::take_unfinished() {
     if (job.planned) jobs.push_back(std::move(job));
   }
   jobs_.clear();
+  lines_.clear();
   return jobs;
 }
 

@@ -52,8 +52,9 @@ struct WatchedJob {
 
 class WatchRecord {
  public:
-  /// Opens directory/watch.jsonl, creates both if absent, and reads what is unfinished.
-  /// errors  kOutput: another watcher holds it, or the system's reason. kUsage: it belongs to another watched folder
+  /// Opens directory/watch.jsonl, creates both if absent, and reads what is unfinished. A file of more than 16 MiB is replaced
+  /// by the lines of that, and becomes watch.old.jsonl. errors  kOutput: another watcher holds it, or the system's reason.
+  /// kUsage: it belongs to another watched folder
   static Result<WatchRecord> open(const std::string& directory, const std::string& root);
 
   /// Jobs that were planned, and are to be moved or to run their command; in the order of their begin. To be called once.
@@ -72,12 +73,14 @@ class WatchRecord {
  private:
   explicit WatchRecord(Journal journal) : journal_(std::move(journal)) {}
   void read_line(const std::string& line);
+  std::string unfinished_lines() const;
   Status append(const char* event, const WatchedJob& job, const Json& more);
 
   Journal journal_;
   std::string folder_;                             // the watched one, of the last run
   std::vector<std::string> order_;                 // ids
   std::map<std::string, WatchedJob> jobs_;         // by id
+  std::map<std::string, std::string> lines_;       // of these, by id
   std::map<std::string, std::string> begun_work_;  // by part
 };
 

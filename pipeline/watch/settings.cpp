@@ -70,6 +70,9 @@ Status check_with(const std::vector<std::string>& with, const ReadCall& read) {
   if (!call) return call.error();
   if (!call->output.empty() && !call->output_of_job_file)
     return usage("has -o; results are named after the parts, leave it out");
+  if (!call->side_output.empty())
+    return usage("{}: is one file for all parts, and each would replace it; leave it out, or write a file for each with --then",
+                 one_line(call->side_output));
   return {};
 }
 

@@ -19,6 +19,7 @@
 
 #include "pipeline/batch/queue.h"
 #include "pipeline/job/errors.h"
+#include "pipeline/watch/after_job.h"
 #include "pipeline/watch/candidates.h"
 #include "pipeline/watch/folder.h"
 #include "pipeline/watch/moves.h"
@@ -82,6 +83,8 @@ class FolderWatcher {
     shared.done = std::move(done);
     shared.failed = std::move(failed);
     shared.run = run;
+    shared.time_limit_seconds = options_.time_limit_seconds;
+    shared.then_limit_seconds = options_.then_limit_seconds;
     running_->wake = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     ::malloc_trim(0);  // once while there is one thread, as in a batch
     for (WatchedJob& job : record.take_unfinished()) add_unfinished(std::move(job));
@@ -111,6 +114,10 @@ class FolderWatcher {
   }
 
   void wait() {
+    for (const auto& task : tasks_) {
+      const std::chrono::duration<double> time = Clock::now() - task->begun;
+      if (options_.time_limit_seconds > 0 && time.count() > options_.time_limit_seconds) task->cancel = true;
+    }
     std::array<pollfd, 2> sources = {pollfd{folder_.events(), POLLIN, 0}, pollfd{running_->wake, POLLIN, 0}};
     ::poll(sources.data(), sources.size(), static_cast<int>(kTick.count()));
     std::uint64_t count = 0;
@@ -188,6 +195,7 @@ class FolderWatcher {
 
   // Threads are detached: a job that ignores its stop must not keep the watcher from ending.
   void start(std::shared_ptr<WatchTask> task) {
+    task->begun = Clock::now();
     need_ += task->need_bytes;
     tasks_.insert(task);
     std::thread([running = running_, task = std::move(task)] {
@@ -221,6 +229,7 @@ class FolderWatcher {
       return waiting_.push_back({task, Clock::now() + kRetryAfter});
     }
     active_.erase(task->job.part);
+    problems_.erase(task->job.part);
     if (task->end != End::kEnded) return;
     const int code = task->job.result.code;
     ++(code == 0 ? summary_.done : summary_.failed);
@@ -243,10 +252,18 @@ class FolderWatcher {
 
   void stop(const std::atomic<bool>& interrupt) {
     summary_.interrupted = interrupt;
-    for (const auto& task : tasks_) task->cancel = true;
+    for (const auto& task : tasks_) {
+      task->stop = true;  // first: a job that is cancelled without it has exceeded its time limit
+      task->cancel = true;
+    }
     std::unique_lock lock(running_->shared.mutex);
-    running_->changed.wait_for(lock, kLastGrace, [&] { return running_->ended.size() == tasks_.size(); });
-    summary_.abandoned = running_->ended.size() != tasks_.size();
+    const auto all_ended = [&] { return running_->ended.size() == tasks_.size(); };
+    const auto commands_ended = [&] {
+      return all_ended() || std::ranges::none_of(tasks_, [](const auto& task) { return task->in_command.load(); });
+    };
+    if (!running_->changed.wait_for(lock, kLastGrace, all_ended))
+      running_->changed.wait_for(lock, kKillAfter + kLastGrace, commands_ended);
+    summary_.abandoned = !all_ended();
   }
 
   const WatchOptions& options_;

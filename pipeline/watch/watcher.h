@@ -21,8 +21,8 @@ struct WatchOptions {
   std::string folder, output;  // watched; of results and of the record
   std::string done, failed;    // where planned files are moved; "": done/ and failed/ in the watched folder
   FolderSettings settings;     // of the whole folder
-  double poll_seconds = 1;
-  std::uint32_t jobs = 1;  // running at a time
+  double poll_seconds = 1, time_limit_seconds = 0, then_limit_seconds = 600;  // of planning, of the command; 0: none
+  std::uint32_t jobs = 1;                                                     // running at a time
   std::uint64_t memory_bytes = 1ull << 30;
   bool once = false;  // ends when nothing is left to do
 };

@@ -10,6 +10,7 @@
 #include "pipeline/cli/job_call.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
+#include "pipeline/watch/after_job.h"
 #include "pipeline/watch/moves.h"
 #include "pipeline/watch/watcher.h"
 #include "stages/support/io/temporary.h"
@@ -32,6 +33,7 @@ CommandSpec watch_spec() {
       {"-o,--output", "DIR", "directory of results, errors and the record watch.jsonl", "", ""},
       {"--with", "WORDS", "command and options for parts, as in --with 'jet --dpi 600'", "jet", ""},
       {"--then", "WORDS", "shell command after each job, with LAMINA_OUTPUT set", "", ""},
+      {"--then-limit", "SECONDS", "time limit of the --then command in seconds; 0: none", "600", ""},
       {"--once", "", "end when nothing is left to do", "", ""},
       {"--settle", "SECONDS", "time without a change until a file is complete, in seconds", "2", "Files"},
       {"--poll", "SECONDS", "interval in which the folder is read, in seconds", "1", "Files"},
@@ -39,6 +41,7 @@ CommandSpec watch_spec() {
       {"--failed", "FOLDER", "folder for parts that failed; default: FOLDER/failed", "", "Files"},
       {"--jobs", "N", "max number of concurrent jobs; 0: one per processor", "0", "Run"},
       {"--memory", "SIZE", "memory limit of all running jobs: 512M, 4G", "1G", "Run"},
+      {"--time-limit", "SECONDS", "time limit per job in seconds; slower jobs fail with exit code 3", "", "Run"},
       {"--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off", "job", "Run", sync->words()},
       {"--json", "", "print one JSON object on stdout for each ended job", "", "Run"},
       {"--quiet", "", "print errors only", "", "Run"}};
@@ -71,6 +74,8 @@ Result<WatchOptions> read_watch_options(const Arguments& arguments) {
   for (const Status& status :
        {arguments.read("--jobs", {0, 1024}, options.jobs), arguments.read("--memory", read_bytes, options.memory_bytes),
         arguments.read("--settle", {0, 1e6, " s"}, options.settings.settle_seconds),
+        arguments.read("--time-limit", {0.001, 1e9, " s"}, options.time_limit_seconds),
+        arguments.read("--then-limit", {0, 1e6, " s"}, options.then_limit_seconds),
         arguments.read("--poll", {0.01, 3600, " s"}, options.poll_seconds)}) {
     if (!status) return status.error();
   }
@@ -136,7 +141,8 @@ Outcome run_watch_command(const Arguments& arguments, Context& context) {
       [&](const WatchedJob& job, std::optional<int> then_code) {
         if (!quiet) context.say(fmt::format("moved    {} to {}", job.part, job.now));
         if (then_code.value_or(0) != 0)
-          context.complain({Fault::kInternal, fmt::format("{}: --then ended with exit code {}", job.part, *then_code)});
+          context.complain({Fault::kInternal, fmt::format("{}: --then ended with exit code {}{}", job.part, *then_code,
+                                                          *then_code == kThenOverdue ? " (time limit)" : "")});
         if (json && printed) printed = context.give(ended_json(job, then_code));
       },
       [&](const Error& error) { context.complain(error); }};

@@ -16,6 +16,7 @@
 #include "stages/data/shortage.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/io/sync.h"
 
 namespace lamina {
 namespace {
@@ -77,10 +78,15 @@ Result<Journal> Journal::open(const std::string& path, std::string_view held) {
 }
 
 Journal::Journal(Journal&& other) noexcept
-    : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)), torn_(other.torn_) {}
+    : path_(std::move(other.path_)),
+      file_(std::exchange(other.file_, -1)),
+      replaced_(std::exchange(other.replaced_, -1)),
+      torn_(other.torn_) {}
 
 Journal::~Journal() {
-  if (file_ >= 0) ::close(file_);
+  for (const int file : {file_, replaced_}) {
+    if (file >= 0) ::close(file);
+  }
 }
 
 bool Journal::empty() const {
@@ -91,6 +97,27 @@ bool Journal::empty() const {
 Status Journal::clear() {
   torn_ = false;
   return ::ftruncate(file_, 0) == 0 ? Status() : reason_of(path_, errno);
+}
+
+Status Journal::replace(std::string_view lines, const std::string& old) {
+  const std::string fresh = path_ + ".part";
+  ::unlink(fresh.c_str());  // of a killed process
+  const int file = ::open(fresh.c_str(), O_RDWR | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0666);
+  if (file < 0) return reason_of(fresh, errno);
+  int reason = ::flock(file, LOCK_EX | LOCK_NB) != 0 ? errno : write_all(file, std::as_bytes(std::span(lines)));
+  if (reason == 0) reason = sync_file(file);
+  if (reason == 0 && (::unlink(old.c_str()) == 0 || errno == ENOENT)) (void)!::link(path_.c_str(), old.c_str());
+  if (reason == 0 && ::rename(fresh.c_str(), path_.c_str()) != 0) reason = errno;
+  if (reason != 0) {
+    ::close(file);
+    ::unlink(fresh.c_str());
+    return reason_of(path_, reason);
+  }
+  sync_folder_of(path_);
+  if (replaced_ >= 0) ::close(replaced_);
+  replaced_ = std::exchange(file_, file);  // stays locked: another process may have opened it
+  torn_ = false;
+  return {};
 }
 
 Status Journal::read(const ReadLine& line) { return read_lines(path_, line, torn_); }

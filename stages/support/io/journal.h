@@ -35,6 +35,9 @@ class Journal {
   bool empty() const;
   /// Empties the file. errors  kOutput
   Status clear();
+  /// Replaces the file by another one with these lines, in one step: a kill leaves the one or the other. The old one gets the
+  /// name `old`, on file systems with hard links. errors  kOutput: the file stays as it is
+  Status replace(std::string_view lines, const std::string& old);
   /// As read_journal().
   Status read(const ReadLine& line);
   /// Adds a line, which ends with a line's end. errors  kOutput: one line with the path and the system's reason
@@ -45,7 +48,7 @@ class Journal {
   Journal(std::string path, int file) : path_(std::move(path)), file_(file) {}
 
   std::string path_;
-  int file_;
+  int file_, replaced_ = -1;
   bool torn_ = false;  // the file does not end with a line break
 };
 

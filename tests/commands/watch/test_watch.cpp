@@ -249,6 +249,7 @@ TEST_F(WatchedFolder, PartsWaitForTheCorrectionOfTheirSettings) {
         {"settle_s = \"soon\"\n", "in/sub/watch.toml:1:12: settle_s: "},
         {"with = \"batch\"\n", "'batch' cannot be a job"},
         {"with = \"jet -o x\"\n", "has -o"},
+        {"with = \"jet --machine nuferbj --quote q.csv\"\n", "with: --quote q.csv: is one file for all parts"},
         {"with = \"jet --dip 3\"\n", "--dip"},
         {"output = \".\"\n", "is in the watched folder"},
         {"", "in/sub/watch.toml: is empty or incomplete"},
@@ -327,6 +328,7 @@ TEST_F(WatchedFolder, WrongUseIsRefusedWithOneLine) {
 }
 
 TEST_F(WatchedFolder, ARunningWatcherPlansWhatComesAndEndsWithItsSignal) {
+  fs::create_directories(directory_ / "next");
   for (const int signal : {SIGTERM, SIGINT}) {
     const std::string name = signal == SIGTERM ? "a" : "b";
     const Outcome outcome = watch({}, [&](int process) {
@@ -336,7 +338,9 @@ TEST_F(WatchedFolder, ARunningWatcherPlansWhatComesAndEndsWithItsSignal) {
       EXPECT_TRUE(wait_for("in/done/" + name + ".stl"));
       // Neither the folder nor the output takes a second watcher.
       EXPECT_EQ(run_lamina({"watch", "in", "-o", "other", "--once"}, directory_.path()).code, 4);
-      EXPECT_EQ(run_lamina({"watch", "in/sub", "-o", "out", "--once"}, directory_.path()).code, 4);
+      EXPECT_EQ(run_lamina({"watch", "next", "-o", "out", "--once"}, directory_.path()).code, 4);
+      EXPECT_EQ(run_lamina({"watch", "next", "-o", "other", "--once"}, directory_.path()).code, 0);
+      EXPECT_EQ(run_lamina({"watch", "in/sub", "-o", "third", "--once"}, directory_.path()).code, 2);
       fs::create_directories(directory_ / ("in/later-" + name));
       put_box("in/later-" + name + "/c.stl");
       EXPECT_TRUE(wait_for("in/done/later-" + name + "/c.stl"));
@@ -404,13 +408,14 @@ TEST_F(WatchedFolder, AKilledWatcherContinuesItsPartAndItsCommand) {
 // The states between two steps, as a kill leaves them; the next run begins in another directory.
 TEST_F(WatchedFolder, EveryStepOfAKilledWatcherIsContinued) {
   fs::create_directories(directory_ / "elsewhere");
-  const std::string then = "echo x >> " + directory_ / "then.txt";
+  const std::string then = "test -e \"$LAMINA_PART\" && echo x >> " + directory_ / "then.txt";
   const auto run = [&] {
     return run_lamina({"watch", "../in/", "-o", "../out", "--with", "jet --bed 20x20 --dpi 100 --layer 0.5", "--settle", "0.02",
                        "--poll", "0.02", "--once", "--then", then},
                       directory_ / "elsewhere");
   };
-  for (const std::string last : {"started", "begun", "planned", "planned and published", "moved", "then"}) {
+  for (const std::string last :
+       {"started", "begun", "planned", "planned and published", "planned and moved", "moved", "then"}) {
     fs::remove_all(directory_ / "out");
     fs::remove_all(directory_ / "in");
     fs::remove(directory_ / "then.txt");
@@ -425,7 +430,8 @@ TEST_F(WatchedFolder, EveryStepOfAKilledWatcherIsContinued) {
       if (line.find("\"event\":\"" + last.substr(0, last.find(' ')) + "\"") != std::string::npos) break;
     }
     write_text(directory_ / "out/watch.jsonl", kept + "{\"event\":\"mov");  // torn
-    if (last != "moved" && last != "then") fs::rename(directory_ / "in/done/sub/a.stl", directory_ / "in/sub/a.stl");
+    if (last != "planned and moved" && last != "moved" && last != "then")
+      fs::rename(directory_ / "in/done/sub/a.stl", directory_ / "in/sub/a.stl");
     if (last == "planned" || last == "begun") {
       fs::create_directories(work);
       fs::rename(directory_ / "out/sub/a", work + "/a");
@@ -441,6 +447,23 @@ TEST_F(WatchedFolder, EveryStepOfAKilledWatcherIsContinued) {
   }
 }
 
+TEST_F(WatchedFolder, ALongRecordIsReplacedByWhatIsUnfinished) {
+  put_box("in/a.stl");
+  put_box("in/b.stl");
+  ASSERT_EQ(watch({"--then", "echo x >> then.txt"}).code, 0);
+  std::string record = read_text(directory_ / "out/watch.jsonl");
+  record.resize(record.rfind("{\"event\":\"ended\""));  // killed within the command
+  record.insert(0, std::string(17 << 20, 'x') + "\n");
+  write_text(directory_ / "out/watch.jsonl", record);
+  write_text(directory_ / "out/watch.jsonl.part", "of a kill");
+  EXPECT_EQ(watch().code, 0);
+  EXPECT_EQ(read_text(directory_ / "then.txt"), "x\nx\nx\n");
+  EXPECT_EQ(read_text(directory_ / "out/watch.old.jsonl"), record);
+  EXPECT_EQ(events("begun").size() + events("planned").size() + events("moved").size(), 3u);
+  EXPECT_EQ(events("ended").size(), 1u);
+  EXPECT_FALSE(has("out/watch.jsonl.part"));
+}
+
 TEST_F(WatchedFolder, UnfinishedWorkOfAPartThatIsGoneIsRemoved) {
   put_box("in/a.stl", 12);
   EXPECT_EQ(watch({"--with", "jet --bed 20x20 --dpi 1200 --layer 0.005"},
@@ -453,6 +476,38 @@ TEST_F(WatchedFolder, UnfinishedWorkOfAPartThatIsGoneIsRemoved) {
   fs::remove(directory_ / "in/a.stl");
   EXPECT_EQ(watch().code, 0);
   EXPECT_EQ(files_below(directory_ / "out"), Words{"watch.jsonl"});
+  EXPECT_FALSE(has("out/.watch"));
+}
+
+TEST_F(WatchedFolder, ACommandAfterAJobEndsAtItsTimeLimitOrAtAStopEvenIfItIgnoresSignals) {
+  const std::string waits = "echo $$ > then.txt; while test ! -e go; do sleep 0.1; done";
+  const auto still_runs = [&] { return ::kill(static_cast<pid_t>(std::stol(read_text(directory_ / "then.txt"))), 0) == 0; };
+  put_box("in/a.stl");
+  Outcome outcome = watch({"--then", waits, "--then-limit", "0.1"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.err.find("a.stl: --then ended with exit code 124 (time limit)"), std::string::npos) << outcome.err;
+  EXPECT_EQ(events("ended").at(0)["then_code"], 124);
+  EXPECT_FALSE(still_runs());
+  fs::remove(directory_ / "then.txt");
+  put_box("in/b.stl");
+  outcome = watch({"--then", "trap '' TERM; " + waits, "--then-limit", "0"}, [&](int process) {
+    EXPECT_TRUE(wait_for("then.txt"));
+    ::kill(process, SIGTERM);
+  });
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(events("ended").size(), 1u);
+  EXPECT_FALSE(still_runs());
+  write_text(directory_ / "go", "");
+}
+
+TEST_F(WatchedFolder, AJobThatTakesTooLongFailsAndItsCommandRuns) {
+  put_box("in/a.stl", 12);
+  const Outcome outcome = watch({"--with", "jet --bed 20x20 --dpi 2400 --layer 0.001 --sync off", "--time-limit", "0.2",
+                                 "--then", "sleep 0.5; echo $LAMINA_CODE > then.txt"});
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_EQ(read_text(directory_ / "out/a.error.txt"), "took longer than its time limit of 0.2 s\n");
+  EXPECT_EQ(read_text(directory_ / "then.txt"), "3\n");
+  EXPECT_EQ(files_below(directory_ / "in"), Words{"failed/a.stl"});
   EXPECT_FALSE(has("out/.watch"));
 }
 

@@ -30,6 +30,12 @@ class FilesOfAFolder : public ::testing::Test {
     scan();
     return folder_.is_complete(name, settle_seconds, kNoStop);
   }
+  bool has_leases(const std::string& name) {
+    const int file = ::open((directory_ / name).c_str(), O_RDONLY | O_CLOEXEC);
+    const bool leased = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0;
+    ::close(file);
+    return leased;
+  }
   void put_box(const std::string& name) { test::write_box(directory_ / name, {0, 0, 0}, {1, 2, 3}); }
 
   test::Directory directory_;
@@ -68,13 +74,12 @@ TEST_F(FilesOfAFolder, AreCompleteAtOnceWhenTheirWriterClosesThemAndTheyStateThe
 TEST_F(FilesOfAFolder, AreCompleteAtOnceEvenIfTheyCameBeforeTheEventsOfTheirFolder) {
   fs::create_directories(directory_ / "sub");
   put_box("sub/a.stl");
-  const int file = ::open((directory_ / "sub/a.stl").c_str(), O_RDONLY | O_CLOEXEC);
-  const bool has_leases = ::fcntl(file, F_SETLEASE, F_RDLCK) == 0;
-  ::close(file);
-  if (!has_leases) GTEST_SKIP() << "a file system without leases";
+  if (!has_leases("sub/a.stl")) GTEST_SKIP() << "a file system without leases";
   EXPECT_TRUE(complete("sub/a.stl"));
-  std::ofstream open(directory_ / "sub/a.stl", std::ios::binary | std::ios::in);
-  Folder other = std::move(*Folder::open(directory_ / "sub", {}));
+  const test::Directory next;
+  fs::copy_file(directory_ / "sub/a.stl", next / "a.stl");
+  std::ofstream open(next / "a.stl", std::ios::binary | std::ios::in);
+  Folder other = std::move(*Folder::open(next.path().string(), {}));
   EXPECT_TRUE(other.scan().ok());
   EXPECT_FALSE(other.is_complete("a.stl", 1000, kNoStop));
   open.close();
@@ -103,7 +108,52 @@ TEST_F(FilesOfAFolder, AreCompleteAtOnceWhenTheyAreRenamedUnlessSomethingIsMissi
   fs::resize_file(directory_ / "new.part", 83);
   fs::rename(directory_ / "new.part", directory_ / "b.stl");
   EXPECT_FALSE(complete("b.stl", 0));
-  EXPECT_TRUE(Folder::stays_incomplete(folder_.files().at("b.stl"), 0));
+  EXPECT_EQ(Folder::lack_of(folder_.files().at("b.stl"), 0), "83 of at least 84 bytes");
+}
+
+TEST_F(FilesOfAFolder, AreIncompleteWhileAnyoneHasThemOpenForWritingHoweverLongUnchanged) {
+  put_box("a.stl");
+  test::write_text(directory_ / "b.obj", "v 0 0 0\n");
+  if (!has_leases("a.stl")) GTEST_SKIP() << "a file system without leases";
+  for (const char* name : {"a.stl", "b.obj"}) {
+    EXPECT_TRUE(complete(name, 0));
+    std::ofstream open(directory_ / name, std::ios::binary | std::ios::in);
+    EXPECT_FALSE(complete(name, 0)) << name;
+    EXPECT_EQ(Folder::lack_of(folder_.files().at(name), 0), "a program has it open for writing");
+    open.close();
+    EXPECT_TRUE(complete(name, 0)) << name;
+  }
+}
+
+TEST_F(FilesOfAFolder, AreReadAgainAfterAnErrorWithoutAChange) {
+  put_box("a.stl");
+  const int file = ::open((directory_ / "a.stl").c_str(), O_RDONLY | O_CLOEXEC);
+  if (::fcntl(file, F_SETLEASE, F_WRLCK) != 0) GTEST_SKIP() << "a file system without leases";  // nobody else can open it
+  EXPECT_FALSE(complete("a.stl", 0));
+  EXPECT_NE(Folder::lack_of(folder_.files().at("a.stl"), 0).find("a.stl: cannot be opened"), std::string::npos);
+  ::fcntl(file, F_SETLEASE, F_UNLCK);
+  ::close(file);
+  EXPECT_FALSE(complete("a.stl", 0));  // not at once: there is no busy loop
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  EXPECT_TRUE(complete("a.stl", 0));
+}
+
+TEST_F(FilesOfAFolder, HaveOneWatcherAlsoInFoldersAboveAndBelow) {
+  for (const char* folder : {"a/b/c", "a/next", "a/.hidden/d"}) fs::create_directories(directory_ / folder);
+  const auto fault = [](const std::string& root) {
+    const auto folder = Folder::open(root, {});
+    return folder ? Fault::kInterrupted : folder.error().fault;
+  };
+  EXPECT_EQ(fault(directory_ / "a"), Fault::kUsage);
+  EXPECT_EQ(fault(directory_.path()), Fault::kOutput);
+  const test::Directory root;
+  for (const char* folder : {"a/b/c", "a/next", "a/.hidden/d"}) fs::create_directories(root / folder);
+  {
+    const auto watched = Folder::open(root / "a/b", {}), hidden = Folder::open(root / "a/.hidden/d", {});
+    for (const auto& folder : {root / "a", root.path().string(), root / "a/b/c"}) EXPECT_EQ(fault(folder), Fault::kUsage);
+    EXPECT_EQ(fault(root / "a/next"), Fault::kInterrupted);  // no fault
+  }
+  EXPECT_EQ(fault(root / "a"), Fault::kInterrupted);
 }
 
 TEST_F(FilesOfAFolder, OfOtherFormatsAreCompleteAfterATimeWithoutAChange) {
