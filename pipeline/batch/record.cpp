@@ -15,6 +15,13 @@ namespace {
 
 Hash128 key_of(const BatchJob& job) { return hash_text(job.output.empty() ? hex(job.id) : job.position()); }
 
+constexpr std::string_view kPlan = R"({"plan":")";  // begins the first line of the record of a share
+
+std::optional<Hash128> plan_in(std::string_view line) {
+  Hash128 plan;
+  return line.starts_with(kPlan) && read_hex(line.substr(kPlan.size(), 32), plan) ? std::optional(plan) : std::nullopt;
+}
+
 /// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, BatchRecord::Earlier, HashOrder>& earlier) try {
   if (!json_nests_within(line)) return;
@@ -42,6 +49,7 @@ void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, Batc
 }
 
 void read_entry(const std::string& line, std::uint64_t at, RecordedBatch& batch) try {
+  if (const auto plan = plan_in(line)) batch.plan = plan;
   if (!json_nests_within(line)) return;
   const Json json = parse_json(line);
   if (const Json* count = json.find("jobs")) {
@@ -106,7 +114,8 @@ Json result_json(const BatchJob& job, const BatchResult& result, const Json& val
           {"result", value}};
 }
 
-Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool overwrite) {
+Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool overwrite,
+                                      const std::function<Result<Hash128>()>& plan) {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::create_directories(files.directory, error);
@@ -116,19 +125,28 @@ Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool
       Journal::open(path, files.shares > 0 ? "this share is running right now in another process; wait for it"
                                            : "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
-  if (!journal->empty() && !resume && !overwrite) {
+  BatchRecord record(files, std::move(*journal));
+  const Result<Hash128> current = plan ? plan() : Hash128();
+  if (!current) {
+    if (record.journal_.empty()) fs::remove(path, error);  // what this call has made
+    return current.error();
+  }
+  std::optional<Hash128> recorded;
+  const auto read = [&](const std::string& line, std::uint64_t at) {
+    if (const auto found = plan_in(line)) recorded = found;
+    if (resume) read_line(line, at, record.earlier_);
+  };
+  if (Status status = resume || plan ? record.journal_.read(read) : Status(); !status) return status.error();
+  const bool replaced = plan && recorded != *current;  // of another plan
+  if (!record.journal_.empty() && !resume && !overwrite && !replaced) {
     return usage(
         "{}: belongs to an earlier batch; continue it with --resume, replace it with --overwrite, or name another directory",
         path);
   }
-  BatchRecord record(files, std::move(*journal));
-  if (resume) {
-    const Status status =
-        record.journal_.read([&](const std::string& line, std::uint64_t at) { read_line(line, at, record.earlier_); });
-    if (!status) return status.error();
-  } else if (Status status = record.journal_.clear(); !status) {
-    return status.error();
-  }
+  if (resume && !replaced) return record;
+  record.earlier_.clear();
+  if (Status status = record.journal_.clear(); !status) return status.error();
+  if (Status status = plan ? record.append(json_line({{"plan", hex(*current)}})) : Status(); !status) return status.error();
   return record;
 }
 

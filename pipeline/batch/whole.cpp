@@ -49,14 +49,16 @@ Status read_undivided(BatchDirectory& batch) {
 Status read_share(const SharePlan& plan, ShareState& state, BatchDirectory& batch) {
   const BatchFiles files(batch.directory, state.number, plan.shares);
   if (!is_file(files.record())) return {};
-  state.started = true;
   state.running = is_journal_held(files.record());
   Result<RecordedBatch> record = read_record(files);
   if (!record) return record.error();
+  const bool current = record->plan == plan.generation;
+  state.started = current || state.running;
+  if (!current) return {};  // of a plan that was replaced
   for (auto& [key, job] : record->jobs) {
     const std::uint32_t number = job.job.number;
     if (!job.ended || number == 0 || number > plan.jobs.size()) continue;
-    const PlannedJob& planned = plan.jobs[number - 1];  // records of an earlier plan may be here
+    const PlannedJob& planned = plan.jobs[number - 1];
     if (planned.share == state.number && planned.words == words_hash(job.job)) add_ended(std::move(job), state, batch);
   }
   return {};

@@ -120,10 +120,14 @@ TEST_F(BatchInShares, MergedTheyAreTheUndividedBatch) {
 TEST_F(BatchInShares, EachJobIsInOneShareThatEveryProcessWouldPlan) {
   write_list();
   share("2/3");
-  const std::string plan = read_text(directory_ / "out/shares.tsv");
+  const auto jobs_of_plan = [&] {
+    const std::string text = read_text(directory_ / "out/shares.tsv");
+    return text.substr(text.find("\nshares\t"), text.rfind("end\t") - text.find("\nshares\t"));  // without the generation
+  };
+  const std::string plan = jobs_of_plan();
   fs::rename(directory_ / "out", directory_ / "first");
   share("3/3");
-  EXPECT_EQ(read_text(directory_ / "out/shares.tsv"), plan);
+  EXPECT_EQ(jobs_of_plan(), plan);
   std::set<int> jobs;
   for (int i = 1; i <= 3; ++i) {
     share(std::to_string(i) + "/3", {"--resume"});
@@ -137,15 +141,53 @@ TEST_F(BatchInShares, EachJobIsInOneShareThatEveryProcessWouldPlan) {
 
 TEST_F(BatchInShares, ProcessesThatStartTogetherFollowOnePlan) {
   write_list();
-  std::vector<std::thread> processes;
-  std::vector<Outcome> ended(6);
-  for (int i = 0; i < 6; ++i)
-    processes.emplace_back(
-        [&, i] { ended[static_cast<std::size_t>(i)] = share(std::to_string(i + 1) + "/6", {"--overwrite"}); });
-  for (std::thread& process : processes) process.join();
-  for (const Outcome& outcome : ended) EXPECT_TRUE(outcome.code == 0 || outcome.code == 3) << outcome.err;
+  const auto start_all = [&] {
+    std::vector<std::thread> processes;
+    std::vector<Outcome> ended(6);
+    for (int i = 0; i < 6; ++i)
+      processes.emplace_back(
+          [&, i] { ended[static_cast<std::size_t>(i)] = share(std::to_string(i + 1) + "/6", {"--overwrite"}); });
+    for (std::thread& process : processes) process.join();
+    for (const Outcome& outcome : ended) EXPECT_TRUE(outcome.code == 0 || outcome.code == 3) << outcome.err;
+  };
+  start_all();
+  // Again with a plan to be replaced.
+  const std::string plan = read_text(directory_ / "out/shares.tsv");
+  write_text(directory_ / "jobs.txt", read_text(directory_ / "jobs.txt") + "info part11.stl\n");
+  start_all();
+  EXPECT_NE(read_text(directory_ / "out/shares.tsv"), plan);
   EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 3);
   EXPECT_EQ(files_of_batch("out"), kFilesOfUndivided);
+}
+
+TEST_F(BatchInShares, AShareReplacesNoPlanOfARunningOneAndNoRecordOfAnEqualPlan) {
+  write_list();
+  for (const char* shard : {"1/2", "2/2"}) share(shard);
+  const auto missing = [&](std::size_t number) {
+    return Json::parse(lamina({"batch", "out", "--status", "--json"}).out)["shares"][number - 1]["missing"].get<int>();
+  };
+  const std::string plan = read_text(directory_ / "out/shares.tsv");
+  EXPECT_NE(share("1/2", {"--overwrite"}).code, 2);
+  EXPECT_EQ(read_text(directory_ / "out/shares.tsv"), plan);
+  EXPECT_EQ(missing(2), 0);
+  // Equal jobs of a replaced plan do not count, also after a plan of the first list.
+  fs::copy(directory_ / "jobs.txt", directory_ / "first.txt");
+  write_text(directory_ / "jobs.txt", read_text(directory_ / "jobs.txt") + "info part11.stl\n");
+  const int held = ::open((directory_ / "out/batch-2-of-2.jsonl").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(::flock(held, LOCK_EX | LOCK_NB), 0);
+  const Outcome refused = share("1/2", {"--overwrite"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_EQ(refused.error_lines(), 1u) << refused.err;
+  EXPECT_NE(refused.err.find("out/batch-2-of-2.jsonl: is running in another process"), std::string::npos) << refused.err;
+  EXPECT_EQ(read_text(directory_ / "out/shares.tsv"), plan);
+  ::close(held);
+  for (const char* list : {"jobs.txt", "first.txt"}) {
+    EXPECT_NE(share("1/2", {"--overwrite"}, list).code, 2);
+    EXPECT_GT(missing(2), 0) << list;
+  }
+  EXPECT_NE(lamina({"merge", "out"}).err.find("share 2 of 2: never started"), std::string::npos);
+  share("2/2", {"--resume"}, "first.txt");
+  EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 3);
 }
 
 TEST_F(BatchInShares, WrongSharesAreRefusedInOneLine) {
