@@ -22,12 +22,26 @@ std::optional<Hash128> plan_in(std::string_view line) {
   return line.starts_with(kPlan) && read_hex(line.substr(kPlan.size(), 32), plan) ? std::optional(plan) : std::nullopt;
 }
 
+/// Adds the bytes of an output that is not UTF-8: JSON text loses them.
+void add_output_bytes(const BatchJob& job, Json& entry) {
+  const std::string_view output = job.position();
+  if (!is_utf8(output)) entry["output_bytes"] = std::vector<std::uint8_t>(output.begin(), output.end());
+}
+
+/// errors  throws JsonError
+std::string output_in(const Json& entry) {
+  const Json* const list = entry.find("output_bytes");
+  if (list == nullptr) return entry.at("output").text();
+  const auto bytes = list->get<std::vector<std::uint8_t>>();
+  return {bytes.begin(), bytes.end()};
+}
+
 /// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, BatchRecord::Earlier, HashOrder>& earlier) try {
   if (!json_nests_within(line)) return;
   const Json json = parse_json(line);
   const bool ended = json.contains("ended");
-  const std::string id = json.at(ended ? "ended" : "begun").text(), position = json.at("output").text();
+  const std::string id = json.at(ended ? "ended" : "begun").text(), position = output_in(json);
   BatchRecord::Earlier entry;
   if (!read_hex(id, entry.begun)) return;
   if (ended) {
@@ -60,7 +74,7 @@ void read_entry(const std::string& line, std::uint64_t at, RecordedBatch& batch)
   const bool ended = json.contains("ended");
   RecordedJob entry;
   entry.job.number = json.at("job").get<std::uint32_t>();
-  entry.job.output = json.at("output").text();
+  entry.job.output = output_in(json);
   if (!read_hex(json.at(ended ? "ended" : "begun").text(), entry.job.id)) return;
   const std::string& output = entry.job.output;
   RecordedJob& known = batch.jobs[hash_text(output.empty() ? fmt::format("\n{}", entry.job.number) : output)];
@@ -165,12 +179,14 @@ Status BatchRecord::planned(std::size_t jobs) { return append(json_line({{"jobs"
 Status BatchRecord::begun(const BatchJob& job, bool unowned) {
   Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.position()}};
   if (unowned) entry["unowned"] = true;
+  add_output_bytes(job, entry);
   return append(json_line(entry));
 }
 
 Status BatchRecord::ended(const BatchJob& job, BatchResult& result) {
   Json entry = {{"ended", hex(job.id)}};
   entry.update(result_json(job, result, result.value));
+  add_output_bytes(job, entry);
   // Of a job file: relative to the working directory, not to the batch's.
   if (job.below == 0 && !job.output.empty() && !job.output.starts_with('/')) entry["elsewhere"] = true;
   const std::string text = json_line(entry);

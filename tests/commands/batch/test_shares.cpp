@@ -278,6 +278,20 @@ TEST_F(BatchInShares, MergeNamesWhatIsMissingAndWritesNothing) {
   EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 3);
 }
 
+TEST_F(BatchInShares, NamesThatAreNotUtf8AreMergedVerifiedAndKept) {
+  write_boxes(1);
+  for (const char* name : {"b\xe9.stl", "b\xe8.stl"}) fs::copy(directory_ / "part10.stl", directory_ / name);
+  write_text(directory_ / "jobs.txt",
+             "jet b\xe9.stl --bed 60x60 --dpi 100\njet b\xe8.stl --bed 60x60 --dpi 100\ninfo b\xe8.stl\n");
+  for (const char* shard : {"1/2", "2/2"}) EXPECT_EQ(share(shard).code, 0);
+  const Outcome merged = lamina({"merge", "out"});
+  EXPECT_EQ(merged.code, 0) << merged.err;
+  EXPECT_EQ(summary("out")["jobs"].size(), 3u);
+  EXPECT_EQ(lamina({"verify", "out"}).code, 0);
+  EXPECT_EQ(lamina({"batch", "jobs.txt", "-o", "out", "--resume", "--quiet"}).code, 0);
+  EXPECT_EQ(outcomes("out"), Words(3, "kept"));
+}
+
 TEST_F(BatchInShares, RecordsOfAnotherListDoNotCount) {
   write_list();
   for (const char* shard : {"1/2", "2/2"}) share(shard);
