@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/journal.h"
 #include "tests/commands/batch/batch.h"
 
 namespace lamina::test {
@@ -250,6 +251,28 @@ TEST_F(BatchInShares, ARunningShareIsLeftAloneAndReported) {
   EXPECT_TRUE(fs::exists(directory_ / "out/shares.tsv"));
   ::close(held);
   EXPECT_EQ(lamina({"batch", "out", "--status"}).code, 3);
+}
+
+TEST_F(BatchInShares, AShareThatStartsAsItsPlanIsMergedIsRefused) {
+  write_list();
+  for (const char* shard : {"1/2", "2/2"}) share(shard);
+  const std::string lock = directory_ / "out/shares.tsv.lamina-aaaaaaaaaaaaa.part",
+                    record = directory_ / "out/batch-2-of-2.jsonl";
+  write_text(lock, "");
+  const int merging = ::open(lock.c_str(), O_RDWR | O_CLOEXEC);  // as lamina merge does
+  ASSERT_EQ(::flock(merging, LOCK_EX | LOCK_NB), 0);
+  Outcome started;
+  std::thread process([&] { started = share("2/2", {"--overwrite"}); });
+  for (int tries = 0; tries < 1000 && !is_journal_held(record); ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  fs::remove(directory_ / "out/shares.tsv");
+  fs::remove(lock);
+  ::close(merging);
+  process.join();
+  EXPECT_EQ(started.code, 4);
+  EXPECT_EQ(started.error_lines(), 1u) << started.err;
+  EXPECT_NE(started.err.find("were merged or planned again"), std::string::npos) << started.err;
+  EXPECT_GT(fs::file_size(record), 0u);
 }
 
 TEST_F(BatchInShares, MergeNamesWhatIsMissingAndWritesNothing) {
