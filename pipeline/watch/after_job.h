@@ -12,7 +12,7 @@
 namespace lamina::pipeline {
 
 /// Runs `/bin/sh -c command` in a process group of its own. Its input is empty, its output goes to standard error.
-/// variables  added to the environment
+/// variables  added to the environment; they replace those of the same name
 /// returns    the exit code, 128 + signal if one ended it; nothing if it was stopped by `stop` (SIGTERM to its group)
 /// errors     kInternal: it cannot be started
 Result<std::optional<int>> run_shell(const std::string& command,
