@@ -34,7 +34,7 @@ Status read_undivided(BatchDirectory& batch) {
   const BatchFiles files(batch.directory);
   Result<RecordedBatch> record = read_record(files);
   if (!record) return record.error();
-  ShareState state{.started = true, .running = is_journal_held(files.record())};
+  ShareState state{.started = record->planned > 0 || !record->jobs.empty(), .running = is_journal_held(files.record())};
   std::size_t last = 0;
   for (auto& [key, job] : record->jobs) {
     last = std::max<std::size_t>(last, job.job.number);
@@ -111,14 +111,15 @@ Status write_record(const BatchDirectory& batch, const FileOptions& how, const s
 }  // namespace
 
 int BatchDirectory::code() const {
-  const auto is_open = [](const ShareState& state) { return state.missing() > 0 || state.running; };
-  if (std::ranges::any_of(states, is_open)) return static_cast<int>(Fault::kVerification);
+  if (std::ranges::any_of(states, &ShareState::is_open)) return static_cast<int>(Fault::kVerification);
   BatchSummary summary;
   for (const RecordedJob& job : jobs) summary.results.push_back(job.result);
   return batch_code(summary);
 }
 
-bool is_batch_directory(const std::string& directory) { return has_shares(directory) || has_undivided_batch(directory); }
+bool is_batch_directory(const std::string& directory) {
+  return has_shares(directory) || is_file(BatchFiles(directory).record());
+}
 
 Result<BatchDirectory> read_batch_directory(const std::string& directory) {
   if (!is_batch_directory(directory))
@@ -156,7 +157,7 @@ std::string status_text(const BatchDirectory& batch) {
     text += fmt::format("{} of {} jobs done", state.done, state.jobs);
     if (state.failed > 0) text += fmt::format(", {} failed", state.failed);
     if (state.missing() > 0) text += fmt::format(", {} missing", state.missing());
-    text += state.running ? ", running\n" : state.started || state.jobs == 0 ? "\n" : ", never started\n";
+    text += state.running ? ", running\n" : state.started || (batch.shares > 0 && state.jobs == 0) ? "\n" : ", never started\n";
   }
   return text;
 }
@@ -186,9 +187,11 @@ Json status_json(const BatchDirectory& batch) {
 std::vector<std::string> missing_lines(const BatchDirectory& batch) {
   std::vector<std::string> lines;
   for (const ShareState& state : batch.states) {
-    if (state.missing() == 0 && !state.running) continue;
+    if (!state.is_open()) continue;
     const std::string share = batch.shares == 0 ? "" : fmt::format("share {} of {}: ", state.number, batch.shares);
-    if (!state.started) {
+    if (!state.started && batch.shares == 0) {
+      lines.push_back(state.running ? "has just started; wait for it" : "no job was started; run the batch again");
+    } else if (!state.started) {
       lines.push_back(fmt::format("{}never started; run it with --shard {}/{}", share, state.number, batch.shares));
     } else if (state.running) {
       lines.push_back(fmt::format("{}running, {} jobs missing; wait for it", share, state.missing()));

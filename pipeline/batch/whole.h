@@ -21,6 +21,7 @@ struct ShareState {
   bool started = false, running = false;
 
   std::size_t missing() const { return jobs - done - failed; }
+  bool is_open() const { return missing() > 0 || running || (number == 0 && !started); }
 };
 
 struct BatchDirectory {

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -346,6 +347,26 @@ TEST_F(BatchInShares, StatusOfAnUndividedBatchCountsItsJobs) {
   EXPECT_GT(json["missing"], 6);
   EXPECT_EQ(json["running"], false);
   EXPECT_EQ(lamina({"merge", "whole"}).code, 5);
+  // As it starts, and killed then.
+  write_text(directory_ / "whole/batch.jsonl", "");
+  const auto reported = [&](const std::string& printed, const std::string& missing) {
+    const Outcome now = lamina({"batch", "whole", "--status"}), merged = lamina({"merge", "whole"});
+    EXPECT_EQ(now.code + merged.code, 10) << now.err << merged.err;
+    EXPECT_EQ(now.out, printed);
+    EXPECT_EQ(merged.err, "lamina: whole: " + missing + "\n");
+  };
+  reported("0 of 0 jobs done, never started\n", "no job was started; run the batch again");
+  const int held = ::open((directory_ / "whole/batch.jsonl").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(::flock(held, LOCK_EX | LOCK_NB), 0);
+  reported("0 of 0 jobs done, running\n", "has just started; wait for it");
+  ::close(held);
+}
+
+TEST_F(BatchInShares, ForSlurmStandardInputIsRefusedInOneLine) {
+  const std::string program = fs::path(LAMINA_TEST_DIR).parent_path() / "scripts/cluster/slurm_batch", err = directory_ / "err";
+  const int status = std::system(("LAMINA=false '" + program + "' 2 - -o out 2>'" + err + "'").c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_EQ(read_text(err), "scripts/cluster/slurm_batch: -: the tasks cannot read standard input; write the list to a file\n");
 }
 
 TEST_F(BatchInShares, PlanSharesEstimatesByDryRunsAndRunsNoJob) {
