@@ -71,23 +71,27 @@ TEST(Journal, AFileThatIsRemovedBeforeItIsLockedIsMadeAgain) {
 
 TEST(Rename, WithoutOneStepExactlyOneOfManyGetsTheName) {
   const Directory directory;
-  std::atomic<int> renamed = 0;
-  std::vector<std::thread> threads;
-  for (int i = 0; i < 8; ++i) {
-    const std::string from = directory / std::to_string(i);
-    write_text(from, std::to_string(i));
-    threads.emplace_back([&, from] {
-      const int reason = rename_new_by_link(from, directory / "name");
-      EXPECT_TRUE(reason == 0 || reason == EEXIST) << reason;
-      EXPECT_EQ(std::filesystem::exists(from), reason != 0);
-      renamed += reason == 0;
-    });
+  for (int round = 0; round < 300; ++round) {
+    const std::string name = directory / std::to_string(round);
+    std::atomic<int> ready = 0, renamed = 0;
+    std::vector<std::thread> threads;
+    for (int i = 0; i < 2; ++i) {
+      const std::string from = directory / ("from" + std::to_string(i));
+      write_text(from, "");
+      threads.emplace_back([&, from] {
+        for (++ready; ready < 2;) std::this_thread::yield();
+        const int reason = rename_new_by_link(from, name);
+        EXPECT_TRUE(reason == 0 || reason == EEXIST) << reason;
+        EXPECT_EQ(std::filesystem::exists(from), reason != 0);
+        renamed += reason == 0;
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(renamed, 1);
   }
-  for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(renamed, 1);
   EXPECT_EQ(rename_new_by_link(directory / "absent", directory / "other"), ENOENT);
   std::filesystem::create_directory(directory / "folder");
-  EXPECT_EQ(rename_new_by_link(directory / "folder", directory / "name"), EEXIST);
+  EXPECT_EQ(rename_new_by_link(directory / "folder", directory / "0"), EEXIST);
   EXPECT_EQ(rename_new_by_link(directory / "folder", directory / "moved"), 0);
 }
 

@@ -262,6 +262,9 @@ TEST_F(BatchInShares, AShareThatStartsAsItsPlanIsMergedIsRefused) {
   write_text(lock, "");
   const int merging = ::open(lock.c_str(), O_RDWR | O_CLOEXEC);  // as lamina merge does
   ASSERT_EQ(::flock(merging, LOCK_EX | LOCK_NB), 0);
+  std::thread second([&] { lamina({"merge", "out", "--quiet"}); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_FALSE(fs::exists(directory_ / "out/batch.jsonl"));  // it waits for the first one
   Outcome started;
   std::thread process([&] { started = share("2/2", {"--overwrite"}); });
   for (int tries = 0; tries < 1000 && !is_journal_held(record); ++tries)
@@ -270,6 +273,7 @@ TEST_F(BatchInShares, AShareThatStartsAsItsPlanIsMergedIsRefused) {
   fs::remove(lock);
   ::close(merging);
   process.join();
+  second.join();
   EXPECT_EQ(started.code, 4);
   EXPECT_EQ(started.error_lines(), 1u) << started.err;
   EXPECT_NE(started.err.find("were merged or planned again"), std::string::npos) << started.err;
