@@ -15,12 +15,33 @@ namespace {
 
 Hash128 key_of(const BatchJob& job) { return hash_text(job.output.empty() ? hex(job.id) : job.position()); }
 
+constexpr std::string_view kPlan = R"({"plan":")";  // begins the first line of the record of a share
+
+std::optional<Hash128> plan_in(std::string_view line) {
+  Hash128 plan;
+  return line.starts_with(kPlan) && read_hex(line.substr(kPlan.size(), 32), plan) ? std::optional(plan) : std::nullopt;
+}
+
+/// Adds the bytes of an output that is not UTF-8: JSON text loses them.
+void add_output_bytes(const BatchJob& job, Json& entry) {
+  const std::string_view output = job.position();
+  if (!is_utf8(output)) entry["output_bytes"] = std::vector<std::uint8_t>(output.begin(), output.end());
+}
+
+/// errors  throws JsonError
+std::string output_in(const Json& entry) {
+  const Json* const list = entry.find("output_bytes");
+  if (list == nullptr) return entry.at("output").text();
+  const auto bytes = list->get<std::vector<std::uint8_t>>();
+  return {bytes.begin(), bytes.end()};
+}
+
 /// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, BatchRecord::Earlier, HashOrder>& earlier) try {
   if (!json_nests_within(line)) return;
   const Json json = parse_json(line);
   const bool ended = json.contains("ended");
-  const std::string id = json.at(ended ? "ended" : "begun").text(), position = json.at("output").text();
+  const std::string id = json.at(ended ? "ended" : "begun").text(), position = output_in(json);
   BatchRecord::Earlier entry;
   if (!read_hex(id, entry.begun)) return;
   if (ended) {
@@ -42,6 +63,7 @@ void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, Batc
 }
 
 void read_entry(const std::string& line, std::uint64_t at, RecordedBatch& batch) try {
+  if (const auto plan = plan_in(line)) batch.plan = plan;
   if (!json_nests_within(line)) return;
   const Json json = parse_json(line);
   if (const Json* count = json.find("jobs")) {
@@ -52,7 +74,7 @@ void read_entry(const std::string& line, std::uint64_t at, RecordedBatch& batch)
   const bool ended = json.contains("ended");
   RecordedJob entry;
   entry.job.number = json.at("job").get<std::uint32_t>();
-  entry.job.output = json.at("output").text();
+  entry.job.output = output_in(json);
   if (!read_hex(json.at(ended ? "ended" : "begun").text(), entry.job.id)) return;
   const std::string& output = entry.job.output;
   RecordedJob& known = batch.jobs[hash_text(output.empty() ? fmt::format("\n{}", entry.job.number) : output)];
@@ -106,7 +128,8 @@ Json result_json(const BatchJob& job, const BatchResult& result, const Json& val
           {"result", value}};
 }
 
-Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool overwrite) {
+Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool overwrite,
+                                      const std::function<Result<Hash128>()>& plan) {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::create_directories(files.directory, error);
@@ -116,19 +139,28 @@ Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool
       Journal::open(path, files.shares > 0 ? "this share is running right now in another process; wait for it"
                                            : "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
-  if (!journal->empty() && !resume && !overwrite) {
+  BatchRecord record(files, std::move(*journal));
+  const Result<Hash128> current = plan ? plan() : Hash128();
+  if (!current) {
+    if (record.journal_.empty()) fs::remove(path, error);  // what this call has made
+    return current.error();
+  }
+  std::optional<Hash128> recorded;
+  const auto read = [&](const std::string& line, std::uint64_t at) {
+    if (const auto found = plan_in(line)) recorded = found;
+    if (resume) read_line(line, at, record.earlier_);
+  };
+  if (Status status = resume || plan ? record.journal_.read(read) : Status(); !status) return status.error();
+  const bool replaced = plan && recorded != *current;  // of another plan
+  if (!record.journal_.empty() && !resume && !overwrite && !replaced) {
     return usage(
         "{}: belongs to an earlier batch; continue it with --resume, replace it with --overwrite, or name another directory",
         path);
   }
-  BatchRecord record(files, std::move(*journal));
-  if (resume) {
-    const Status status =
-        record.journal_.read([&](const std::string& line, std::uint64_t at) { read_line(line, at, record.earlier_); });
-    if (!status) return status.error();
-  } else if (Status status = record.journal_.clear(); !status) {
-    return status.error();
-  }
+  if (resume && !replaced) return record;
+  record.earlier_.clear();
+  if (Status status = record.journal_.clear(); !status) return status.error();
+  if (Status status = plan ? record.append(json_line({{"plan", hex(*current)}})) : Status(); !status) return status.error();
   return record;
 }
 
@@ -147,12 +179,14 @@ Status BatchRecord::planned(std::size_t jobs) { return append(json_line({{"jobs"
 Status BatchRecord::begun(const BatchJob& job, bool unowned) {
   Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.position()}};
   if (unowned) entry["unowned"] = true;
+  add_output_bytes(job, entry);
   return append(json_line(entry));
 }
 
 Status BatchRecord::ended(const BatchJob& job, BatchResult& result) {
   Json entry = {{"ended", hex(job.id)}};
   entry.update(result_json(job, result, result.value));
+  add_output_bytes(job, entry);
   // Of a job file: relative to the working directory, not to the batch's.
   if (job.below == 0 && !job.output.empty() && !job.output.starts_with('/')) entry["elsewhere"] = true;
   const std::string text = json_line(entry);

@@ -1,10 +1,11 @@
 // pipeline/batch/record.h: the progress of a batch, in a file that survives a kill at any moment.
 //
-// batch.jsonl is a journal of JSON objects (stages/support/io/journal.h): {"jobs":N} when a batch starts, {"begun":ID,...} when
-// a job starts, {"ended":ID,...} with its result when it ends. A line torn by a kill or a full disk is skipped, and its job
-// runs again.
+// batch.jsonl is a journal of JSON objects (stages/support/io/journal.h): {"jobs":N} when a batch starts, {"plan":GENERATION}
+// when a share starts, {"begun":ID,...} when a job starts, {"ended":ID,...} with its result when it ends. A line torn by a kill
+// or a full disk is skipped, and its job runs again.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -51,9 +52,12 @@ class BatchRecord {
 
   /// Opens the record and creates it and its directory if absent. `resume` reads and continues the record; otherwise it
   /// starts empty.
+  /// plan    for a share, called while the record is open: returns the generation of its plan. A record of another one is
+  ///         replaced; an error leaves the record
   /// errors  kUsage: a record exists, and neither `resume` nor `overwrite` is set. kOutput: another run holds it, or the
-  ///         system's reason
-  static Result<BatchRecord> open(const BatchFiles& files, bool resume, bool overwrite);
+  ///         system's reason; of `plan`
+  static Result<BatchRecord> open(const BatchFiles& files, bool resume, bool overwrite,
+                                  const std::function<Result<Hash128>()>& plan = {});
 
   const Earlier* earlier(const BatchJob& job) const;
   /// Of a job that ended and is kept; any thread may call it. errors  kOutput: the record cannot be read
@@ -107,6 +111,7 @@ struct RecordedJob {
 
 struct RecordedBatch {
   std::size_t planned = 0;                         // jobs; 0 if unknown
+  std::optional<Hash128> plan;                     // generation of the plan of a share
   std::map<Hash128, RecordedJob, HashOrder> jobs;  // by their output, or by number without one
 };
 

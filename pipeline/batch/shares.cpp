@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kFirstLine = "lamina shares\t1\n", kColumns = "job\tshare\tcost\twords\tsource\n", kEnd = "end\t";
+constexpr std::string_view kFirstLine = "lamina shares\t2\n", kColumns = "job\tshare\tcost\twords\tsource\n", kEnd = "end\t";
 constexpr std::uint64_t kStartBytes = 64 << 10;  // what it costs to start a job, in bytes of a part
 constexpr std::uint64_t kMaxShares = 1'000'000;  // of read_shard()
 
@@ -88,8 +88,8 @@ bool read_planned_job(std::string_view line, std::size_t number, const SharePlan
 }
 
 std::string plan_text(const SharePlan& plan) {
-  std::string text = fmt::format("{}version\t{}\nshares\t{}\nwith\t{}\nunit\t{}\n{}", kFirstLine, plan.version, plan.shares,
-                                 plan.with, plan.unit, kColumns);
+  std::string text = fmt::format("{}version\t{}\ngeneration\t{}\nshares\t{}\nwith\t{}\nunit\t{}\n{}", kFirstLine, plan.version,
+                                 hex(plan.generation), plan.shares, plan.with, plan.unit, kColumns);
   for (std::size_t i = 0; i < plan.jobs.size(); ++i) {
     const PlannedJob& job = plan.jobs[i];
     text += fmt::format("{}\t{}\t{}\t{}\t{}\n", i + 1, job.share, job.cost, hex(job.words), job.source);
@@ -123,25 +123,43 @@ Status check_plan(const SharePlan& found, const SharePlan& own, const std::strin
                (longer ? own : found).jobs[both].source, both + 1, longer ? "not in" : "missing; it is in", path);
 }
 
-Status remove_files(const std::string& directory, bool (*is_file_of)(const std::string&)) {
+bool is_undivided_file(const std::string& name) { return name.starts_with("batch.") || name.starts_with("summary."); }
+
+/// Files of the shares, or of an undivided batch. errors  of `fault`: one of them is running
+Result<std::vector<fs::path>> idle_files(const std::string& directory, bool undivided, Fault fault) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
-    if (is_file_of(entry->path().filename().string())) files.push_back(entry->path());
+    const std::string name = entry->path().filename().string();
+    if (is_batch_file(name) && is_undivided_file(name) == undivided) files.push_back(entry->path());
   }
   std::ranges::sort(files);
   for (const fs::path& file : files) {
     if (file.extension() == ".jsonl" && is_journal_held(file.string()))
-      return failure(Fault::kOutput, "{}: is running in another process; wait for it", file.string());
+      return failure(fault, "{}: is running in another process; wait for it", file.string());
   }
-  for (const fs::path& file : files) {
+  return files;
+}
+
+/// The file, locked until it is finished or discarded. Waits for a process that has the lock.
+Result<File> lock_file(const std::string& path, bool replace) {
+  for (int idle = 0;;) {
+    Result<File> file = File::open(path, {.follow = false, .replace = replace});
+    if (file || (check_not_being_written(path) && ++idle == 5)) return file;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+Status remove_files(const std::string& directory, bool undivided) {
+  const Result<std::vector<fs::path>> files = idle_files(directory, undivided, Fault::kOutput);
+  if (!files) return files.error();
+  std::error_code error;
+  for (const fs::path& file : *files) {
     if (!error) fs::remove(file, error);
     if (error) return failure(Fault::kOutput, "{}: {}", file.string(), error.message());
   }
   return {};
 }
-
-bool is_undivided_file(const std::string& name) { return name.starts_with("batch.") || name.starts_with("summary."); }
 
 }  // namespace
 
@@ -195,7 +213,7 @@ Hash128 words_hash(const BatchJob& job) { return hash_text(fmt::format("{}\n{}",
 
 SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
                       const std::vector<std::string>& with, std::string_view unit) {
-  SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), {}};
+  SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), {}, {}};
   const std::vector<std::uint32_t> share_of = divide_jobs(costs, shares);
   plan.jobs.reserve(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i)
@@ -221,9 +239,10 @@ Result<SharePlan> read_plan(const std::string& directory) {
   text.remove_prefix(kFirstLine.size());
   SharePlan plan;
   std::uint64_t shares = 0;
-  const auto version_text = take_value(text, "version"), count = take_value(text, "shares"), with = take_value(text, "with"),
-             unit = take_value(text, "unit");
-  if (!version_text || !count || !with || !unit || !read_count(*count, kMaxShares, shares) || shares == 0)
+  const auto version_text = take_value(text, "version"), generation = take_value(text, "generation"),
+             count = take_value(text, "shares"), with = take_value(text, "with"), unit = take_value(text, "unit");
+  if (!version_text || !generation || !count || !with || !unit || !read_hex(*generation, plan.generation) ||
+      !read_count(*count, kMaxShares, shares) || shares == 0)
     return damaged_plan(path);
   plan.shares = static_cast<std::uint32_t>(shares);
   plan.version = *version_text;
@@ -247,21 +266,43 @@ Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& o
   fs::create_directories(directory, error);
   if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
   const std::string path = plan_path(directory);
+  std::optional<File> file;
   while (true) {
-    bool replace = false;
-    if (has_shares(directory)) {
+    const bool replace = has_shares(directory);
+    if (replace) {
       Result<SharePlan> found = read_plan(directory);
       const Status status = found ? check_plan(*found, own, path) : Status(found.error());
       if (status) return found;
       if (!overwrite) return status.error();
-      replace = true;
     }
-    const Status written = write_file(path, plan_text(own), {.follow = false, .replace = replace});
-    if (written) return own;
-    // Another process was faster, or is writing the file right now.
-    if (replace || (!has_shares(directory) && check_not_being_written(path))) return written.error();
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    if (!file) {  // another process may have written the plan before this one has the lock
+      Result<File> locked = lock_file(path, overwrite);
+      if (!locked) return locked.error();
+      file.emplace(std::move(*locked));
+      continue;
+    }
+    SharePlan plan = own;
+    std::string seed = temporary_name(path);  // random
+    if (replace) {
+      if (const auto idle = idle_files(directory, false, Fault::kUsage); !idle) return idle.error();
+      if (Result<std::string> replaced = read_file(path, {.max_bytes = 2 * kMaxListBytes}); replaced)
+        seed = std::move(*replaced);
+    }
+    plan.generation = hash_text(seed + plan_text(own));
+    if (Status status = file->append(plan_text(plan)); !status) return status.error();
+    if (const auto written = file->finish(); !written && (replace || !has_shares(directory))) return written.error();
+    file.reset();
   }
+}
+
+Result<File> lock_plan(const std::string& directory) { return lock_file(plan_path(directory), true); }
+
+Result<Hash128> check_same_plan(const std::string& directory, const SharePlan& plan) {
+  const std::string path = plan_path(directory);
+  while (!check_not_being_written(path)) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const Result<SharePlan> now = read_plan(directory);
+  if (now && now->generation == plan.generation) return plan.generation;
+  return failure(Fault::kOutput, "{}: the shares were merged or planned again as this one started; start it again", path);
 }
 
 bool has_shares(const std::string& directory) { return is_file(plan_path(directory)); }
@@ -272,12 +313,8 @@ bool has_undivided_batch(const std::string& directory) {
   return is_file(path) && fs::file_size(path, error) > 0 && !error;
 }
 
-Status remove_shares(const std::string& directory) {
-  return remove_files(directory, [](const std::string& name) { return is_batch_file(name) && !is_undivided_file(name); });
-}
+Status remove_shares(const std::string& directory) { return remove_files(directory, false); }
 
-Status remove_undivided_batch(const std::string& directory) {
-  return remove_files(directory, [](const std::string& name) { return is_batch_file(name) && is_undivided_file(name); });
-}
+Status remove_undivided_batch(const std::string& directory) { return remove_files(directory, true); }
 
 }  // namespace lamina::pipeline

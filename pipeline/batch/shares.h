@@ -13,6 +13,7 @@
 #include "pipeline/batch/job.h"
 #include "stages/data/status.h"
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 
@@ -53,6 +54,7 @@ struct SharePlan {
   std::string version;  // of lamina
   std::string with;     // words of --with, as JSON
   std::string unit;     // of the costs: kPlannedUnit or another one
+  Hash128 generation;   // repeated by the records of the shares; set by agree_on_plan()
   std::vector<PlannedJob> jobs;
 
   /// Sums of the costs of all shares.
@@ -71,10 +73,19 @@ std::string plan_path(const std::string& directory);
 /// errors  kVerification: the file is damaged or missing
 Result<SharePlan> read_plan(const std::string& directory);
 
-/// The plan in the directory, which is `own` if there was none. A different plan is replaced with `overwrite` only.
-/// errors  kUsage: another number of shares, other words of --with, another version, another list (names the first difference);
-///         kVerification: the file is damaged; kOutput
+/// Locks the plan, there or not, until the file is finished or discarded; waits for another process that has the lock.
+/// errors  kOutput
+Result<File> lock_plan(const std::string& directory);
+
+/// The plan in the directory, which is `own` if there was none. A different plan is replaced with `overwrite` only. Its
+/// generation depends on the plan that it replaces, so that processes that start together replace a plan once.
+/// errors  kUsage: another number of shares, other words of --with, another version, another list (names the first difference),
+///         a share of the plan to be replaced is running; kVerification: the file is damaged; kOutput
 Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& own, bool overwrite);
+
+/// Checks, with the record of a share open, that its plan was not replaced or merged. Waits for processes that lock the plan:
+/// they find the record open, or this finds what they did. returns  its generation. errors  kOutput: it was
+Result<Hash128> check_same_plan(const std::string& directory, const SharePlan& plan);
 
 /// Whether a directory belongs to a batch in shares; whether it belongs to one that is not divided.
 bool has_shares(const std::string& directory);

@@ -34,7 +34,7 @@ Status read_undivided(BatchDirectory& batch) {
   const BatchFiles files(batch.directory);
   Result<RecordedBatch> record = read_record(files);
   if (!record) return record.error();
-  ShareState state{.started = true, .running = is_journal_held(files.record())};
+  ShareState state{.started = record->planned > 0 || !record->jobs.empty(), .running = is_journal_held(files.record())};
   std::size_t last = 0;
   for (auto& [key, job] : record->jobs) {
     last = std::max<std::size_t>(last, job.job.number);
@@ -49,15 +49,16 @@ Status read_undivided(BatchDirectory& batch) {
 Status read_share(const SharePlan& plan, ShareState& state, BatchDirectory& batch) {
   const BatchFiles files(batch.directory, state.number, plan.shares);
   if (!is_file(files.record())) return {};
-  state.started = true;
   state.running = is_journal_held(files.record());
   Result<RecordedBatch> record = read_record(files);
   if (!record) return record.error();
+  const bool current = record->plan == plan.generation;
+  state.started = current || state.running;
+  if (!current) return {};  // of a plan that was replaced
   for (auto& [key, job] : record->jobs) {
     const std::uint32_t number = job.job.number;
     if (!job.ended || number == 0 || number > plan.jobs.size()) continue;
-    const PlannedJob& planned = plan.jobs[number - 1];  // records of an earlier plan may be here
-    if (planned.share == state.number && planned.words == words_hash(job.job)) add_ended(std::move(job), state, batch);
+    if (plan.jobs[number - 1].share == state.number) add_ended(std::move(job), state, batch);
   }
   return {};
 }
@@ -110,14 +111,15 @@ Status write_record(const BatchDirectory& batch, const FileOptions& how, const s
 }  // namespace
 
 int BatchDirectory::code() const {
-  const auto is_open = [](const ShareState& state) { return state.missing() > 0 || state.running; };
-  if (std::ranges::any_of(states, is_open)) return static_cast<int>(Fault::kVerification);
+  if (std::ranges::any_of(states, &ShareState::is_open)) return static_cast<int>(Fault::kVerification);
   BatchSummary summary;
   for (const RecordedJob& job : jobs) summary.results.push_back(job.result);
   return batch_code(summary);
 }
 
-bool is_batch_directory(const std::string& directory) { return has_shares(directory) || has_undivided_batch(directory); }
+bool is_batch_directory(const std::string& directory) {
+  return has_shares(directory) || is_file(BatchFiles(directory).record());
+}
 
 Result<BatchDirectory> read_batch_directory(const std::string& directory) {
   if (!is_batch_directory(directory))
@@ -155,7 +157,7 @@ std::string status_text(const BatchDirectory& batch) {
     text += fmt::format("{} of {} jobs done", state.done, state.jobs);
     if (state.failed > 0) text += fmt::format(", {} failed", state.failed);
     if (state.missing() > 0) text += fmt::format(", {} missing", state.missing());
-    text += state.running ? ", running\n" : state.started || state.jobs == 0 ? "\n" : ", never started\n";
+    text += state.running ? ", running\n" : state.started || (batch.shares > 0 && state.jobs == 0) ? "\n" : ", never started\n";
   }
   return text;
 }
@@ -185,9 +187,11 @@ Json status_json(const BatchDirectory& batch) {
 std::vector<std::string> missing_lines(const BatchDirectory& batch) {
   std::vector<std::string> lines;
   for (const ShareState& state : batch.states) {
-    if (state.missing() == 0 && !state.running) continue;
+    if (!state.is_open()) continue;
     const std::string share = batch.shares == 0 ? "" : fmt::format("share {} of {}: ", state.number, batch.shares);
-    if (!state.started) {
+    if (!state.started && batch.shares == 0) {
+      lines.push_back(state.running ? "has just started; wait for it" : "no job was started; run the batch again");
+    } else if (!state.started) {
       lines.push_back(fmt::format("{}never started; run it with --shard {}/{}", share, state.number, batch.shares));
     } else if (state.running) {
       lines.push_back(fmt::format("{}running, {} jobs missing; wait for it", share, state.missing()));

@@ -21,6 +21,7 @@ struct ShareState {
   bool started = false, running = false;
 
   std::size_t missing() const { return jobs - done - failed; }
+  bool is_open() const { return missing() > 0 || running || (number == 0 && !started); }
 };
 
 struct BatchDirectory {
@@ -50,7 +51,7 @@ Json status_json(const BatchDirectory& batch);
 std::vector<std::string> missing_lines(const BatchDirectory& batch);
 
 /// Makes batch.jsonl, summary.json and summary.tsv from all shares, as an undivided batch writes them, then removes the files
-/// of the shares. No share is missing or running.
+/// of the shares. No share is missing or running. The caller has the lock of the plan (shares.h) since it has read the batch.
 /// schema  of summary.json
 /// errors  kOutput; kInterrupted: `cancel` was set before batch.jsonl was complete, and nothing is written
 Status merge_shares(const BatchDirectory& batch, std::int64_t schema, const FileOptions& how, const std::atomic<bool>& cancel);

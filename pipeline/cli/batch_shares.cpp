@@ -107,25 +107,38 @@ Result<std::vector<BatchJob>> prepare_list(std::vector<BatchEntry> entries, cons
                        [&](const BatchJob&, const Call& call) { costs.push_back(files.of(call)); });
 }
 
+/// Removes the files of the shares; a share that starts meanwhile waits and then finds no plan.
+Status replace_shares(const std::string& directory) {
+  if (!has_shares(directory)) return remove_shares(directory);
+  const Result<File> lock = lock_plan(directory);
+  return lock ? remove_shares(directory) : Status(lock.error());
+}
+
 constexpr const char* kFileUnit = "bytes x layers/mm";
 
 }  // namespace
 
 Result<std::vector<BatchJob>> prepare_undivided(std::vector<BatchEntry> entries, const BatchShare& share,
-                                                const BatchOptions& options) {
+                                                const BatchOptions& options, std::optional<BatchRecord>& record) {
   if (has_shares(options.directory) && !options.overwrite) {
     return usage(
         "{}: belongs to a batch in shares; continue it with --shard, join it with lamina merge, or replace it with --overwrite",
         plan_path(options.directory));
   }
   auto jobs = prepare_batch(std::move(entries), share, read_call);
-  if (!jobs || !has_shares(options.directory)) return jobs;
-  const Status removed = remove_shares(options.directory);
-  return removed ? std::move(jobs) : removed.error();
+  if (!jobs) return jobs;
+  if (Status status = has_shares(options.directory) ? replace_shares(options.directory) : Status(); !status)
+    return status.error();
+  Result<BatchRecord> opened = BatchRecord::open(options.files(), options.resume, options.overwrite);
+  if (!opened) return opened.error();
+  record.emplace(std::move(*opened));
+  const Status planned = record->planned(jobs->size());
+  return planned ? std::move(jobs) : planned.error();
 }
 
 Result<std::vector<BatchJob>> prepare_share(std::vector<BatchEntry> entries, const BatchShare& share,
-                                            const BatchOptions& options, const std::vector<std::string>& with) {
+                                            const BatchOptions& options, const std::vector<std::string>& with,
+                                            std::optional<BatchRecord>& record) {
   std::vector<CostedJob> costs;
   auto jobs = prepare_list(std::move(entries), share, options, costs);
   if (!jobs) return jobs.error();
@@ -135,6 +148,10 @@ Result<std::vector<BatchJob>> prepare_share(std::vector<BatchEntry> entries, con
   }
   const Result<SharePlan> plan = agree_on_plan(options.directory, own, options.overwrite);
   if (!plan) return plan.error();
+  const auto check = [&] { return check_same_plan(options.directory, *plan); };
+  Result<BatchRecord> opened = BatchRecord::open(options.files(), options.resume, options.overwrite, check);
+  if (!opened) return opened.error();
+  record.emplace(std::move(*opened));
   std::vector<BatchJob> chosen;
   for (std::size_t i = 0; i < jobs->size(); ++i) {
     if (plan->jobs[i].share == options.share) chosen.push_back(std::move((*jobs)[i]));
@@ -158,7 +175,7 @@ Result<SharePlan> plan_by_dry_runs(std::vector<BatchEntry> entries, const BatchS
     if (cancel) return failure(Fault::kInterrupted, "interrupted; no share is planned");
     progress(i + 1);
   }
-  for (const auto& remove : {remove_shares, remove_undivided_batch}) {
+  for (const auto& remove : {replace_shares, remove_undivided_batch}) {
     if (Status status = options.overwrite ? remove(options.directory) : Status(); !status) return status.error();
   }
   return agree_on_plan(options.directory, plan_shares(*jobs, costs, options.shares, with, kPlannedUnit), false);

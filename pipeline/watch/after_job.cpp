@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -50,7 +51,9 @@ Result<std::optional<int>> run_shell(const std::string& command,
                                      const std::atomic<bool>& stop) {
   std::vector<std::string> environment;
   for (char** variable = environ; *variable != nullptr; ++variable) {
-    if (!std::string_view(*variable).starts_with("LAMINA_")) environment.emplace_back(*variable);
+    const std::string_view name = std::string_view(*variable).substr(0, std::string_view(*variable).find('='));
+    const auto is_set = [&](const auto& set) { return set.first == name; };
+    if (std::ranges::none_of(variables, is_set)) environment.emplace_back(*variable);
   }
   for (const auto& [name, value] : variables) environment.push_back(fmt::format("{}={}", name, value));
   pid_t process = 0;

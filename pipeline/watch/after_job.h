@@ -16,7 +16,7 @@ inline constexpr int kThenOverdue = 124;               // as of timeout(1)
 inline constexpr std::chrono::seconds kKillAfter{10};  // from SIGTERM to SIGKILL
 
 /// Runs `/bin/sh -c command` in a process group of its own. Its input is empty, its output goes to standard error.
-/// variables      added to the environment
+/// variables      added to the environment; they replace those of the same name
 /// limit_seconds  after which its group is ended by SIGTERM and, kKillAfter later, by SIGKILL; 0: none
 /// stop           ends it in the same way
 /// returns        the exit code, 128 + signal if one ended it, kThenOverdue after the limit; nothing if `stop` ended it

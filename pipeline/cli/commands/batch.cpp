@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <numeric>
+#include <optional>
 
 #include "pipeline/batch/queue.h"
 #include "pipeline/batch/summary.h"
@@ -222,13 +223,11 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const BatchShare share{options.directory, layer_share(options.memory_bytes, options.jobs),
                          *cache ? &(*cache)->inputs() : nullptr};
   if (arguments.has("--plan-shares")) return plan_only(std::move(*entries), share, options, with, arguments, context);
-  auto prepared = options.shares > 0 ? prepare_share(std::move(*entries), share, options, with)
-                                     : prepare_undivided(std::move(*entries), share, options);
+  std::optional<BatchRecord> record;
+  auto prepared = options.shares > 0 ? prepare_share(std::move(*entries), share, options, with, record)
+                                     : prepare_undivided(std::move(*entries), share, options, record);
   if (!prepared) return prepared.error();
   const auto jobs = std::make_shared<const std::vector<BatchJob>>(std::move(*prepared));
-  Result<BatchRecord> record = BatchRecord::open(options.files(), options.resume, options.overwrite);
-  if (!record) return record.error();
-  if (Status status = options.shares > 0 ? Status() : record->planned(jobs->size()); !status) return status;
 
   BatchConsole console(quiet, context);
   keep_on_signals();  // jobs that are done

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "pipeline/batch/shares.h"
 #include "pipeline/batch/whole.h"
@@ -47,6 +49,12 @@ Outcome merge_batch(const Arguments& arguments, Context& context) {
   }
   if (arguments.has("-o,--output") && !same_file(arguments.text("-o,--output"), directory))
     return at_option("-o,--output", "a batch is merged in its own directory; remove -o or give " + directory);
+  std::optional<File> plan;  // a share that starts waits until it is merged
+  if (has_shares(directory)) {
+    Result<File> locked = lock_plan(directory);
+    if (!locked) return locked.error();
+    plan.emplace(std::move(*locked));
+  }
   const Result<BatchDirectory> batch = read_batch_directory(directory);
   if (!batch) return batch.error();
   Faults missing;

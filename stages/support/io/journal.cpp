@@ -66,15 +66,21 @@ bool is_journal_held(const std::string& path) {
 }
 
 Result<Journal> Journal::open(const std::string& path, std::string_view held) {
-  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
-  if (file < 0) return reason_of(path, errno);
-  Journal journal(path, file);
-  struct stat status {};
-  if (::fstat(file, &status) != 0) return reason_of(path, errno);
-  if (!S_ISREG(status.st_mode)) return Error{Fault::kOutput, fmt::format("{}: is a device or a pipe, not a file", path)};
-  if (lock_journal(file)) return journal;
-  if (errno != EWOULDBLOCK) return reason_of(path, errno);
-  return Error{Fault::kOutput, fmt::format("{}: {}", path, held)};
+  while (true) {
+    const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+    if (file < 0) return reason_of(path, errno);
+    Journal journal(path, file);
+    struct stat status {
+    }, named{};
+    if (::fstat(file, &status) != 0) return reason_of(path, errno);
+    if (!S_ISREG(status.st_mode)) return Error{Fault::kOutput, fmt::format("{}: is a device or a pipe, not a file", path)};
+    if (!lock_journal(file)) {
+      if (errno != EWOULDBLOCK) return reason_of(path, errno);
+      return Error{Fault::kOutput, fmt::format("{}: {}", path, held)};
+    }
+    // Another process may have removed or replaced the file before this one had the lock.
+    if (::lstat(path.c_str(), &named) == 0 && named.st_dev == status.st_dev && named.st_ino == status.st_ino) return journal;
+  }
 }
 
 Journal::Journal(Journal&& other) noexcept

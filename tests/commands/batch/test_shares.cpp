@@ -6,11 +6,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 #include <sstream>
 #include <thread>
 
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/journal.h"
 #include "tests/commands/batch/batch.h"
 
 namespace lamina::test {
@@ -120,10 +122,14 @@ TEST_F(BatchInShares, MergedTheyAreTheUndividedBatch) {
 TEST_F(BatchInShares, EachJobIsInOneShareThatEveryProcessWouldPlan) {
   write_list();
   share("2/3");
-  const std::string plan = read_text(directory_ / "out/shares.tsv");
+  const auto jobs_of_plan = [&] {
+    const std::string text = read_text(directory_ / "out/shares.tsv");
+    return text.substr(text.find("\nshares\t"), text.rfind("end\t") - text.find("\nshares\t"));  // without the generation
+  };
+  const std::string plan = jobs_of_plan();
   fs::rename(directory_ / "out", directory_ / "first");
   share("3/3");
-  EXPECT_EQ(read_text(directory_ / "out/shares.tsv"), plan);
+  EXPECT_EQ(jobs_of_plan(), plan);
   std::set<int> jobs;
   for (int i = 1; i <= 3; ++i) {
     share(std::to_string(i) + "/3", {"--resume"});
@@ -137,15 +143,53 @@ TEST_F(BatchInShares, EachJobIsInOneShareThatEveryProcessWouldPlan) {
 
 TEST_F(BatchInShares, ProcessesThatStartTogetherFollowOnePlan) {
   write_list();
-  std::vector<std::thread> processes;
-  std::vector<Outcome> ended(6);
-  for (int i = 0; i < 6; ++i)
-    processes.emplace_back(
-        [&, i] { ended[static_cast<std::size_t>(i)] = share(std::to_string(i + 1) + "/6", {"--overwrite"}); });
-  for (std::thread& process : processes) process.join();
-  for (const Outcome& outcome : ended) EXPECT_TRUE(outcome.code == 0 || outcome.code == 3) << outcome.err;
+  const auto start_all = [&] {
+    std::vector<std::thread> processes;
+    std::vector<Outcome> ended(6);
+    for (int i = 0; i < 6; ++i)
+      processes.emplace_back(
+          [&, i] { ended[static_cast<std::size_t>(i)] = share(std::to_string(i + 1) + "/6", {"--overwrite"}); });
+    for (std::thread& process : processes) process.join();
+    for (const Outcome& outcome : ended) EXPECT_TRUE(outcome.code == 0 || outcome.code == 3) << outcome.err;
+  };
+  start_all();
+  // Again with a plan to be replaced.
+  const std::string plan = read_text(directory_ / "out/shares.tsv");
+  write_text(directory_ / "jobs.txt", read_text(directory_ / "jobs.txt") + "info part11.stl\n");
+  start_all();
+  EXPECT_NE(read_text(directory_ / "out/shares.tsv"), plan);
   EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 3);
   EXPECT_EQ(files_of_batch("out"), kFilesOfUndivided);
+}
+
+TEST_F(BatchInShares, AShareReplacesNoPlanOfARunningOneAndNoRecordOfAnEqualPlan) {
+  write_list();
+  for (const char* shard : {"1/2", "2/2"}) share(shard);
+  const auto missing = [&](std::size_t number) {
+    return Json::parse(lamina({"batch", "out", "--status", "--json"}).out)["shares"][number - 1]["missing"].get<int>();
+  };
+  const std::string plan = read_text(directory_ / "out/shares.tsv");
+  EXPECT_NE(share("1/2", {"--overwrite"}).code, 2);
+  EXPECT_EQ(read_text(directory_ / "out/shares.tsv"), plan);
+  EXPECT_EQ(missing(2), 0);
+  // Equal jobs of a replaced plan do not count, also after a plan of the first list.
+  fs::copy(directory_ / "jobs.txt", directory_ / "first.txt");
+  write_text(directory_ / "jobs.txt", read_text(directory_ / "jobs.txt") + "info part11.stl\n");
+  const int held = ::open((directory_ / "out/batch-2-of-2.jsonl").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(::flock(held, LOCK_EX | LOCK_NB), 0);
+  const Outcome refused = share("1/2", {"--overwrite"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_EQ(refused.error_lines(), 1u) << refused.err;
+  EXPECT_NE(refused.err.find("out/batch-2-of-2.jsonl: is running in another process"), std::string::npos) << refused.err;
+  EXPECT_EQ(read_text(directory_ / "out/shares.tsv"), plan);
+  ::close(held);
+  for (const char* list : {"jobs.txt", "first.txt"}) {
+    EXPECT_NE(share("1/2", {"--overwrite"}, list).code, 2);
+    EXPECT_GT(missing(2), 0) << list;
+  }
+  EXPECT_NE(lamina({"merge", "out"}).err.find("share 2 of 2: never started"), std::string::npos);
+  share("2/2", {"--resume"}, "first.txt");
+  EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 3);
 }
 
 TEST_F(BatchInShares, WrongSharesAreRefusedInOneLine) {
@@ -210,6 +254,32 @@ TEST_F(BatchInShares, ARunningShareIsLeftAloneAndReported) {
   EXPECT_EQ(lamina({"batch", "out", "--status"}).code, 3);
 }
 
+TEST_F(BatchInShares, AShareThatStartsAsItsPlanIsMergedIsRefused) {
+  write_list();
+  for (const char* shard : {"1/2", "2/2"}) share(shard);
+  const std::string lock = directory_ / "out/shares.tsv.lamina-aaaaaaaaaaaaa.part",
+                    record = directory_ / "out/batch-2-of-2.jsonl";
+  write_text(lock, "");
+  const int merging = ::open(lock.c_str(), O_RDWR | O_CLOEXEC);  // as lamina merge does
+  ASSERT_EQ(::flock(merging, LOCK_EX | LOCK_NB), 0);
+  std::thread second([&] { lamina({"merge", "out", "--quiet"}); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_FALSE(fs::exists(directory_ / "out/batch.jsonl"));  // it waits for the first one
+  Outcome started;
+  std::thread process([&] { started = share("2/2", {"--overwrite"}); });
+  for (int tries = 0; tries < 1000 && !is_journal_held(record); ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  fs::remove(directory_ / "out/shares.tsv");
+  fs::remove(lock);
+  ::close(merging);
+  process.join();
+  second.join();
+  EXPECT_EQ(started.code, 4);
+  EXPECT_EQ(started.error_lines(), 1u) << started.err;
+  EXPECT_NE(started.err.find("were merged or planned again"), std::string::npos) << started.err;
+  EXPECT_GT(fs::file_size(record), 0u);
+}
+
 TEST_F(BatchInShares, MergeNamesWhatIsMissingAndWritesNothing) {
   write_list();
   share("1/3");
@@ -234,6 +304,20 @@ TEST_F(BatchInShares, MergeNamesWhatIsMissingAndWritesNothing) {
   share("2/3", {"--resume"});
   share("3/3", {"--resume"});
   EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 3);
+}
+
+TEST_F(BatchInShares, NamesThatAreNotUtf8AreMergedVerifiedAndKept) {
+  write_boxes(1);
+  for (const char* name : {"b\xe9.stl", "b\xe8.stl"}) fs::copy(directory_ / "part10.stl", directory_ / name);
+  write_text(directory_ / "jobs.txt",
+             "jet b\xe9.stl --bed 60x60 --dpi 100\njet b\xe8.stl --bed 60x60 --dpi 100\ninfo b\xe8.stl\n");
+  for (const char* shard : {"1/2", "2/2"}) EXPECT_EQ(share(shard).code, 0);
+  const Outcome merged = lamina({"merge", "out"});
+  EXPECT_EQ(merged.code, 0) << merged.err;
+  EXPECT_EQ(summary("out")["jobs"].size(), 3u);
+  EXPECT_EQ(lamina({"verify", "out"}).code, 0);
+  EXPECT_EQ(lamina({"batch", "jobs.txt", "-o", "out", "--resume", "--quiet"}).code, 0);
+  EXPECT_EQ(outcomes("out"), Words(3, "kept"));
 }
 
 TEST_F(BatchInShares, RecordsOfAnotherListDoNotCount) {
@@ -267,6 +351,26 @@ TEST_F(BatchInShares, StatusOfAnUndividedBatchCountsItsJobs) {
   EXPECT_GT(json["missing"], 6);
   EXPECT_EQ(json["running"], false);
   EXPECT_EQ(lamina({"merge", "whole"}).code, 5);
+  // As it starts, and killed then.
+  write_text(directory_ / "whole/batch.jsonl", "");
+  const auto reported = [&](const std::string& printed, const std::string& missing) {
+    const Outcome now = lamina({"batch", "whole", "--status"}), merged = lamina({"merge", "whole"});
+    EXPECT_EQ(now.code + merged.code, 10) << now.err << merged.err;
+    EXPECT_EQ(now.out, printed);
+    EXPECT_EQ(merged.err, "lamina: whole: " + missing + "\n");
+  };
+  reported("0 of 0 jobs done, never started\n", "no job was started; run the batch again");
+  const int held = ::open((directory_ / "whole/batch.jsonl").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(::flock(held, LOCK_EX | LOCK_NB), 0);
+  reported("0 of 0 jobs done, running\n", "has just started; wait for it");
+  ::close(held);
+}
+
+TEST_F(BatchInShares, ForSlurmStandardInputIsRefusedInOneLine) {
+  const std::string program = fs::path(LAMINA_TEST_DIR).parent_path() / "scripts/cluster/slurm_batch", err = directory_ / "err";
+  const int status = std::system(("LAMINA=false '" + program + "' 2 - -o out 2>'" + err + "'").c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_EQ(read_text(err), "scripts/cluster/slurm_batch: -: the tasks cannot read standard input; write the list to a file\n");
 }
 
 TEST_F(BatchInShares, PlanSharesEstimatesByDryRunsAndRunsNoJob) {

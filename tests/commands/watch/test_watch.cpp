@@ -272,9 +272,11 @@ TEST_F(WatchedFolder, PartsWaitForTheCorrectionOfTheirSettings) {
 TEST_F(WatchedFolder, TheCommandAfterAJobKnowsItsResult) {
   put_box("in/a.stl");
   write_text(directory_ / "in/b.obj", "v 0 0 0\n");
-  const Outcome outcome =
-      watch({"--json", "--then",
-             "echo \"$LAMINA_CODE|$LAMINA_OUTPUT|$LAMINA_PART|$LAMINA_ERROR\" >> then.txt; echo chatter; exit 7"});
+  ::setenv("LAMINA_OF_USER", "own", 1);
+  ::setenv("LAMINA_CODE", "old", 1);
+  const Outcome outcome = watch(
+      {"--json", "--then",
+       "test \"$LAMINA_OF_USER\" = own && echo \"$LAMINA_CODE|$LAMINA_OUTPUT|$LAMINA_PART|$LAMINA_ERROR\" >> then.txt; echo chatter; exit 7"});
   EXPECT_EQ(outcome.code, 3);
   const std::string text = read_text(directory_ / "then.txt"), top = fs::weakly_canonical(directory_.path()).string();
   EXPECT_NE(text.find("0|" + top + "/out/a|" + top + "/in/done/a.stl|\n"), std::string::npos) << text;

@@ -115,11 +115,13 @@ TEST(Shares, ThePlanIsReadAsItWasWrittenAndAnyChangedByteIsDamage) {
   const test::Directory directory;
   const std::string out = directory.path().string();
   const SharePlan plan = plan_of({"a", "b\tc", "d"}, 2, {"jet", "--dpi", "6\n00"});
-  ASSERT_TRUE(agree_on_plan(out, plan, false));
+  const auto agreed = agree_on_plan(out, plan, false);
+  ASSERT_TRUE(agreed);
   const auto read = read_plan(out);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->costs(), (std::vector<std::uint64_t>{2, 1}));
   EXPECT_EQ(read->with, plan.with);
+  EXPECT_EQ(read->generation, agreed->generation);
   ASSERT_EQ(read->jobs.size(), 3u);
   EXPECT_EQ(read->jobs[1].source, "list.txt:2");
   const std::string text = test::read_text(plan_path(out));
@@ -137,7 +139,7 @@ TEST(Shares, ThePlanIsReadAsItWasWrittenAndAnyChangedByteIsDamage) {
   test::write_text(plan_path(out), "");
   EXPECT_EQ(agree_on_plan(out, plan, false).error().fault, Fault::kVerification);
   EXPECT_TRUE(agree_on_plan(out, plan, true));
-  EXPECT_EQ(test::read_text(plan_path(out)), text);
+  EXPECT_EQ(read_plan(out)->jobs.size(), 3u);
 }
 
 TEST(Shares, APlanThatDiffersIsRefusedWithTheFirstDifference) {
