@@ -16,6 +16,7 @@
 #include "stages/data/shortage.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/io/sync.h"
 
 namespace lamina {
 namespace {
@@ -102,6 +103,11 @@ Status Journal::append(std::string line) {
   const int reason = write_all(file_, std::as_bytes(std::span(line)));
   torn_ = reason != 0;
   return torn_ ? Status(write_failure(path_, reason)) : Status();
+}
+
+Status Journal::sync() {
+  const int reason = sync_file(file_);
+  return reason == 0 ? Status() : Status(write_failure(path_, reason));
 }
 
 }  // namespace lamina
