@@ -448,8 +448,10 @@ Result<VerifyReport> verify_any(const std::string& directory, const VerifyOption
   const auto delivered = read_delivered(directory);
   if (!delivered) return delivered.error();
   for (const ManifestFile& file : files) {
-    if (delivered->layers > 0 && file.name != "manifest.json") continue;  // the claim of lamina stream
-    Result<Manifest> manifest = read_manifest((fs::path(directory) / file.name).string());
+    const fs::path path = fs::path(directory) / file.name;
+    const bool is_claim = file.partial && files[0].name == "manifest.json" && fs::is_empty(path, error);
+    if (is_claim || (delivered->layers > 0 && file.name != "manifest.json")) continue;
+    Result<Manifest> manifest = read_manifest(path.string());
     if (!manifest) return manifest.error();
     if (!manifests.empty() && !same_job(manifest->head, manifests[0].head)) {
       report.add(fmt::format("{}: belongs to another job than {} ({})", file.name, files[0].name,

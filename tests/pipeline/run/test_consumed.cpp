@@ -167,6 +167,7 @@ TEST_F(ConsumedJobs, OutputsThatReportNothingAndJobsInUseAreRefused) {
   ASSERT_TRUE(claim.ok());
   refused("stream out --consume", 4, "out: ");
   EXPECT_TRUE(fs::exists(program_of(0)));
+  EXPECT_EQ(test::run_lamina({"verify", "out", "--quick"}, folder_.path()).code, 0) << "of a job that is claimed";
 }
 
 }  // namespace
