@@ -28,7 +28,7 @@ CommandSpec stream_spec() {
       "Examples:\n"
       "  lamina stream out > program.planes\n"
       "  lamina stream out -o part.planes\n"
-      "  lamina stream out --consume | host";
+      "  lamina stream out --consume | cat > received.planes";
   return spec;
 }
 
