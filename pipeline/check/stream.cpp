@@ -2,17 +2,23 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <functional>
 
+#include "pipeline/check/consumed.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/manifest/compare.h"
 #include "pipeline/output/print_program.h"
 #include "stages/support/io/compressed.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMaxWholeBytes = 32 << 20;  // of a file in memory
 
 /// errors  as stream_program
 Result<Manifest> manifest_to_stream(const std::string& directory) {
@@ -35,46 +41,90 @@ Result<Manifest> manifest_to_stream(const std::string& directory) {
   return manifest;
 }
 
+using TakeBytes = std::function<Status(std::span<const std::byte>)>;
+
 class ProgramStream {
  public:
-  ProgramStream(const std::string& directory, File& out) : directory_(directory), out_(out) {}
+  ProgramStream(const std::string& directory, const TakeBytes& take) : directory_(directory), take_(take) {}
 
-  /// max_bytes  of a file whose size is not on record
-  Status add(const std::string& name, const Hash128& hash, std::optional<std::uint64_t> bytes, std::uint64_t max_bytes) {
+  /// bytes  of the file, if they are on record
+  Status add(const std::string& name, const Hash128& hash, std::optional<std::uint64_t> bytes = {}) {
+    const std::string path = (fs::path(directory_) / name).string();
+    const std::uint64_t max_bytes = bytes.value_or(kMaxTomlBytes);
+    const bool read = max_bytes <= kMaxWholeBytes && read_content(path, max_bytes, content_).ok();
+    if (read && hash_text(content_) == hash) return take_(std::as_bytes(std::span(content_)));
     const std::string fault = fault_of_file(directory_, name, hash, bytes);
     if (!fault.empty()) return Error{Fault::kVerification, fmt::format("{}/{}", directory_, fault)};
-    return expand_file((fs::path(directory_) / name).string(), bytes.value_or(max_bytes),
-                       [&](std::span<const std::byte> piece) { return out_.append(piece); });
+    return expand_file(path, max_bytes, take_);
   }
 
  private:
   const std::string& directory_;
-  File& out_;
+  const TakeBytes& take_;
+  std::string content_;
 };
+
+/// first  what is left out
+/// wrote  is called after the start, each layer and the end
+/// errors  as stream_program
+Status write_program(const std::string& directory, const Manifest& manifest, const Delivered& first, const TakeBytes& take,
+                     const std::function<Status(std::uint32_t layers, bool end)>& wrote) {
+  const ManifestHead& head = manifest.head;
+  ProgramStream stream(directory, take);
+  Status status;
+  if (!first.start) {
+    status = stream.add("program/start" + head.program_extension, head.program_start);
+    if (status) status = wrote(0, false);
+  }
+  for (std::uint32_t i = first.layers; i < head.layer_count && status; ++i) {
+    const LayerRecord& record = manifest.layers[i];
+    status =
+        stream.add(program_file_name(record.layer.index, head.program_extension), record.program.hash, record.program.bytes);
+    if (status) status = wrote(i + 1, false);
+  }
+  if (status && !first.end) status = stream.add("program/end" + head.program_extension, head.program_end);
+  return status && !first.end ? wrote(head.layer_count, true) : status;
+}
 
 }  // namespace
 
-Result<StreamReport> stream_program(const std::string& directory, const std::string& output) {
+Result<StreamReport> stream_program(const std::string& directory, const std::string& output, bool consume) {
+  std::optional<Claim> claim;
+  if (std::error_code error; consume && fs::is_directory(directory, error)) {
+    auto taken = Claim::take((fs::path(directory) / "manifest.json").string(), directory);
+    if (!taken) return taken.error();
+    claim.emplace(std::move(*taken));
+  }
   const auto manifest = manifest_to_stream(directory);
   if (!manifest) return manifest.error();
   const ManifestHead& head = manifest->head;
   const std::string end_name = "program/end" + head.program_extension;
   if (const std::string fault = fault_of_file(directory, end_name, head.program_end); !fault.empty())
     return Error{Fault::kVerification, fmt::format("{}/{}", directory, fault)};
+  const auto delivered = read_delivered(directory);
+  if (!delivered) return delivered.error();
+  if (!consume && delivered->layers > 0)
+    return failure(Fault::kVerification, "{}: {}; continue with it", directory, delivered_text(*delivered, head.layer_count));
   auto file = File::open(output, {.stream = true});
   if (!file) return file.error();
-  ProgramStream stream(directory, *file);
-  Status status = stream.add("program/start" + head.program_extension, head.program_start, {}, kMaxTomlBytes);
-  for (std::size_t i = 0; i < manifest->layers.size() && status; ++i) {
-    const LayerRecord& record = manifest->layers[i];
-    const std::string name = program_file_name(record.layer.index, head.program_extension);
-    status = stream.add(name, record.program.hash, record.program.bytes, 0);
+  if (!consume) {
+    const Status status = write_program(
+        directory, *manifest, {}, [&](std::span<const std::byte> bytes) { return file->append(bytes); },
+        [](std::uint32_t, bool) { return Status(); });
+    if (!status) return status.error();
+  } else {
+    auto consumption = Consumption::begin(directory, *manifest, *file);
+    if (!consumption) return consumption.error();
+    Status status = write_program(
+        directory, *manifest, *delivered, [&](std::span<const std::byte> bytes) { return consumption->write(bytes); },
+        [&](std::uint32_t layers, bool end) { return consumption->wrote(layers, end); });
+    const Status taken = consumption->finish();  // also of the layers before one that is refused
+    if (status) status = taken;
+    if (!status) return status.error();
   }
-  if (status) status = stream.add(end_name, head.program_end, {}, kMaxTomlBytes);
-  if (!status) return status.error();
   const auto written = file->finish();
   if (!written) return written.error();
-  return StreamReport{directory, manifest->layers.size(), written->bytes};
+  return StreamReport{directory, head.layer_count - std::min(head.layer_count, delivered->layers), written->bytes};
 }
 
 }  // namespace lamina::pipeline

@@ -14,12 +14,15 @@ struct StreamReport {
 };
 
 /// Writes start, layers in order and end, expanded. A file is compared with its hash in the manifest before its first byte is
-/// written, so that no byte is written that differs.
+/// written, so that no byte is written that differs. Files above 32 MiB are read twice.
 ///
 /// directory  of a whole job with a machine
+/// consume    begin with what no earlier call delivered, and delete images and program of each layer as soon as its last byte
+/// is
+///            taken (check/consumed.h)
 /// output     a file, which appears when it is whole; a device or a pipe; "-" is standard output
 /// errors     kUsage: no such directory, no program; kVerification: unfinished, a shard, a file that is missing or differs;
-///            kOutput
-Result<StreamReport> stream_program(const std::string& directory, const std::string& output);
+///            kOutput; of Consumption
+Result<StreamReport> stream_program(const std::string& directory, const std::string& output, bool consume = false);
 
 }  // namespace lamina::pipeline

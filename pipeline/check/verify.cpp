@@ -12,6 +12,7 @@
 #include <span>
 #include <tuple>
 
+#include "pipeline/check/consumed.h"
 #include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
 #include "pipeline/check/toolpaths.h"
@@ -336,11 +337,13 @@ void check_layers(const std::string& directory, const Manifest& manifest, const 
   finish_replay(inspection, cost);
 }
 
-void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, VerifyReport& report) {
+/// consumed  layers, of which a killed run may have left files
+void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, std::uint32_t consumed,
+                  VerifyReport& report) {
   std::vector<LayersOfJob> jobs;
   for (const Manifest& manifest : manifests) {
     const std::uint32_t first = manifest.head.first_layer;
-    jobs.push_back({&manifest.head, first, first + static_cast<std::uint32_t>(manifest.layers.size())});
+    jobs.push_back({&manifest.head, first, first + consumed + static_cast<std::uint32_t>(manifest.layers.size())});
   }
   for (const std::string& name : stray_files(directory, jobs)) report.add(fmt::format("{}: no manifest names it", name));
 }
@@ -443,8 +446,13 @@ Result<VerifyReport> verify_any(const std::string& directory, const VerifyOption
   std::optional<JobCost> cost;
   bool whole_job = false;  // a manifest of it is there
   bool interrupted = false;
+  const auto delivered = read_delivered(directory);
+  if (!delivered) return delivered.error();
   for (const ManifestFile& file : files) {
-    Result<Manifest> manifest = read_manifest((fs::path(directory) / file.name).string());
+    const fs::path path = fs::path(directory) / file.name;
+    const bool is_claim = file.partial && files[0].name == "manifest.json" && fs::is_empty(path, error);
+    if (is_claim || (delivered->layers > 0 && file.name != "manifest.json")) continue;
+    Result<Manifest> manifest = read_manifest(path.string());
     if (!manifest) return manifest.error();
     if (!manifests.empty() && !same_job(manifest->head, manifests[0].head)) {
       report.add(fmt::format("{}: belongs to another job than {} ({})", file.name, files[0].name,
@@ -463,10 +471,16 @@ Result<VerifyReport> verify_any(const std::string& directory, const VerifyOption
     manifests.push_back(std::move(*manifest));
   }
   std::ranges::stable_sort(manifests, {}, [](const Manifest& manifest) { return manifest.head.first_layer; });
+  const std::uint32_t gone = delivered->layers;
+  if (gone > 0) {
+    auto& layers = manifests.at(0).layers;
+    report.add(delivered_text(*delivered, manifests[0].head.layer_count));
+    layers.erase(layers.begin(), layers.begin() + std::min<std::ptrdiff_t>(gone, std::ssize(layers)));
+  }
   std::optional<replay::VatLevels> vats;  // of all shards, one behind the other
   for (const Manifest& manifest : manifests) check_layers(directory, manifest, options, cost, vats, report);
   // An interrupted run may have finished layers without a line in its manifest.
-  if (!interrupted) check_strays(directory, manifests, report);
+  if (!interrupted) check_strays(directory, manifests, gone, report);
   if (!whole_job && !manifests.empty()) check_shards(shards, manifests[0].head.layer_count, report);
   return report;
 }

@@ -49,7 +49,8 @@ struct VerifyReport : Faults {
 /// Compares every file with the manifest of the whole job, or of all shards present: existence, size and hash. Unless
 /// quick, it also decodes each image and compares columns, rows, resolution and number of set pixels, and replays each
 /// layer's print program on a virtual machine, which must print that image bit for bit. Files in layers/ and program/
-/// without an entry in a manifest are faults, and so are an interrupted job and shards that are missing.
+/// without an entry in a manifest are faults, and so are an interrupted job and shards that are missing. Layers that lamina
+/// stream --consume has deleted are one fault together; the others are compared.
 ///
 /// directory  or a file of toolpaths; toolpaths and contours are compared by the bytes of file and layers (compare_paths). G-code, with or
 ///            without a manifest, is replayed too (check/toolpaths.h), unless quick

@@ -288,6 +288,8 @@ FileDigest File::digest() const {
 
 bool File::streams() const { return state_->streams; }
 
+int File::descriptor() const { return state_->file; }
+
 Status write_file(const std::string& path, std::span<const std::byte> bytes, const FileOptions& options) {
   auto file = File::open(path, options);
   if (!file) return file.error();

@@ -73,6 +73,7 @@ class File {
   std::uint64_t size() const;  // bytes so far
   FileDigest digest() const;   // of the bytes so far
   bool streams() const;        // to a device, a pipe or standard output
+  int descriptor() const;      // until finish()
 
  private:
   struct State;

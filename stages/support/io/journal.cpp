@@ -137,4 +137,9 @@ Status Journal::append(std::string line) {
   return torn_ ? Status(write_failure(path_, reason)) : Status();
 }
 
+Status Journal::sync() {
+  const int reason = sync_file(file_);
+  return reason == 0 ? Status() : Status(write_failure(path_, reason));
+}
+
 }  // namespace lamina

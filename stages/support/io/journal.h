@@ -42,6 +42,8 @@ class Journal {
   Status read(const ReadLine& line);
   /// Adds a line, which ends with a line's end. errors  kOutput: one line with the path and the system's reason
   Status append(std::string line);
+  /// What was added survives a power cut; the caller syncs the folder. errors  kOutput
+  Status sync();
   std::uint64_t end() const;  // of the last line that was added
 
  private:
