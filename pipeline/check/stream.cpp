@@ -11,6 +11,7 @@
 #include "pipeline/manifest/compare.h"
 #include "pipeline/output/print_program.h"
 #include "stages/support/io/compressed.h"
+#include "stages/support/io/container.h"
 #include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
@@ -22,10 +23,9 @@ constexpr std::uint64_t kMaxWholeBytes = 32 << 20;  // of a file in memory
 
 /// errors  as stream_program
 Result<Manifest> manifest_to_stream(const std::string& directory) {
-  std::error_code error;
-  if (!fs::is_directory(directory, error)) return usage("{}: no such directory; name one that lamina jet wrote", directory);
+  if (!is_job_folder(directory)) return usage("{}: no such directory; name one that lamina jet wrote", directory);
   const std::string path = (fs::path(directory) / "manifest.json").string();
-  if (!fs::exists(path, error)) {
+  if (!is_file(path)) {
     return Error{Fault::kVerification, fmt::format("{}: contains no manifest.json; complete the job with --resume, or join its "
                                                    "shards by lamina merge",
                                                    directory)};
@@ -89,6 +89,8 @@ Status write_program(const std::string& directory, const Manifest& manifest, con
 }  // namespace
 
 Result<StreamReport> stream_program(const std::string& directory, const std::string& output, bool consume) {
+  if (consume && is_container(directory))
+    return usage("{}: --consume deletes no files of a container; unpack it and name the folder", directory);
   std::optional<Claim> claim;
   if (std::error_code error; consume && fs::is_directory(directory, error)) {
     auto taken = Claim::take((fs::path(directory) / "manifest.json").string(), directory);
