@@ -16,6 +16,7 @@
 #include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
 #include "pipeline/check/toolpaths.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/manifest/compare.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
@@ -423,7 +424,12 @@ Result<VerifyReport> verify_file(const std::string& path, const VerifyOptions& o
 
 Result<VerifyReport> verify_any(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
-  if (!is_container(directory) && fs::is_regular_file(directory, error)) return verify_file(directory, options);
+  if (!is_container(directory) && fs::is_regular_file(directory, error)) {
+    if (!directory.ends_with(".zip")) return verify_file(directory, options);
+    const auto entries = read_entries(directory);
+    return entries ? failure(Fault::kVerification, "{}: contains no manifest of a job of lamina jet", directory)
+                   : entries.error();
+  }
   if (!is_job_folder(directory)) {
     return Error{Fault::kUsage, fmt::format("{}: no such directory or file; name what lamina jet, lamina slice or lamina "
                                             "extrude wrote",

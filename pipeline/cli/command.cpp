@@ -136,6 +136,7 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
     arguments = std::move(*read);
   }
   console.quiet = arguments.has("--quiet");
+  console.json = arguments.text("--progress") == "json";
   return run(command, arguments, console);
 }
 
@@ -187,10 +188,10 @@ int run_program(int argument_count, char** arguments, Program program) {
   try {
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
     for (const std::string& left : take_left_behind()) console.say("lamina: note: " + left);
-    return outcome.error ? console.complain(*outcome.error) : outcome.code;
+    return console.end(outcome.error ? console.complain(*outcome.error) : outcome.code);
   } catch (const std::exception& error) {
-    if (is_shortage(error)) return console.complain(shortage(error));
-    return console.complain({Fault::kInternal, fmt::format("internal error: {}", error.what())});
+    if (is_shortage(error)) return console.end(console.complain(shortage(error)));
+    return console.end(console.complain({Fault::kInternal, fmt::format("internal error: {}", error.what())}));
   }
 }
 

@@ -56,6 +56,11 @@ class Context {
   virtual const std::atomic<bool>& cancel() = 0;
 };
 
+/// --progress, of commands with long work.
+inline OptionSpec progress_option() {
+  return {"--progress", "KIND", "json: progress and messages as JSON lines on stderr", "auto", "Run", {"auto", "json"}};
+}
+
 /// Lines that a call requested: on stdout, or on stderr where stdout is for JSON; none with --quiet.
 class Answer {
  public:

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -109,12 +110,49 @@ void handle_signals() {
 
 Console::~Console() { Console::say_text({}); }
 
+void Console::put(const Json& line) {
+  const std::lock_guard lock(writing_);
+  write_all(STDERR_FILENO, json_line(line));
+}
+
+void Console::put(const ProgressEvent& event) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::milliseconds kPause(500);
+  const bool is_next = !last_ || last_->stage != event.stage;
+  const Clock::time_point now = Clock::now();
+  if (!is_next && event.done != event.total && now - put_at_ < kPause) return;
+  if (!is_next && event.done == last_->done && event.total == last_->total) return;
+  last_ = event;
+  put_at_ = now;
+  constexpr const char* kStages[] = {"load", "index", "layers", "builds", "jobs"};
+  Json line{{"event", "progress"}, {"stage", kStages[static_cast<std::size_t>(event.stage)]}};
+  if (event.total > 0) line["done"] = event.done, line["total"] = event.total;
+  line["seconds"] = std::chrono::duration<double>(now - begun_).count();
+  put(line);
+}
+
+int Console::end(int code) {
+  if (!json) return code;
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
+  put(Json{{"event", "end"}, {"code", code}, {"seconds", seconds}});
+  return code;
+}
+
 void Console::say_text(std::string_view text) {
+  while (json && !text.empty()) {
+    const std::size_t line = std::min(text.find('\n'), text.size());
+    if (line > 0) put(Json{{"event", "message"}, {"text", one_line(text.substr(0, line))}});
+    text.remove_prefix(std::min(line + 1, text.size()));
+  }
   if (progress_) write_all(STDERR_FILENO, progress_->clear());
   write_all(STDERR_FILENO, text);
 }
 
 int Console::complain(const Error& error) {
+  if (json) {
+    put(Json{{"event", "error"}, {"text", one_line(error.message)}, {"code", static_cast<int>(error.fault)}});
+    return static_cast<int>(error.fault);
+  }
   say("lamina: " + error.message);
   return static_cast<int>(error.fault);
 }
@@ -132,6 +170,8 @@ void Console::progress(const ProgressEvent& event) {
   const bool counted = event.stage == Stage::kLayers || event.stage == Stage::kBuilds;
   if (counted) keep_on_signals();
   if (event.stage == Stage::kLayers) lose_patience();  // builds are removed after a signal, which may take longer
+  if (json) return put(event);
+  if (event.stage == Stage::kJobs) return;  // a batch draws its own line
   if (!progress_) {
     using Style = Progress::Style;
     progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);

@@ -1,6 +1,8 @@
 // pipeline/cli/console.h: the terminal. A closed reader does not end the program.
 #pragma once
 
+#include <chrono>
+#include <mutex>
 #include <optional>
 #include <string_view>
 
@@ -22,9 +24,18 @@ class Console : public Context {
   const std::atomic<bool>& cancel() override;
 
   bool quiet = false;  // suppresses progress
+  bool json = false;   // of --progress json: each line of standard error is a JSON object
+
+  /// With `json`: the last line. returns  the exit code
+  int end(int code);
 
  private:
+  void put(const Json& line);
+  void put(const ProgressEvent& event);
   std::optional<Progress> progress_;
+  std::mutex writing_;                 // of JSON lines
+  std::optional<ProgressEvent> last_;  // as JSON
+  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now(), put_at_;
 };
 
 /// Has every signal that ends the program remove its temporary files first, and closed pipes and limits on file sizes come

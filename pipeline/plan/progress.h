@@ -8,8 +8,8 @@ namespace lamina::pipeline {
 
 /// Reported at intervals while a job runs, from one thread at a time.
 struct ProgressEvent {
-  enum class Stage { kLoading, kIndexing, kLayers, kBuilds } stage;
-  std::uint32_t done = 0, total = 0;  // layers, or builds
+  enum class Stage { kLoading, kIndexing, kLayers, kBuilds, kJobs } stage;
+  std::uint32_t done = 0, total = 0;  // layers, builds or jobs
 };
 using ProgressCallback = std::function<void(const ProgressEvent&)>;
 

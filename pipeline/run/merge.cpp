@@ -281,7 +281,7 @@ class ContainerMerge {
   }
 
   Status run(const std::string& output, const std::optional<Json>& inspection) {
-    if (is_file(output)) return usage("{}: is there already; name another file with -o", output);
+    if (is_file(output) && !is_whole(output)) return usage("{}: is there already; name another file with -o", output);
     Job job;
     job.output = output;
     job.resume = true;  // of a merge that was killed, nothing is kept
@@ -289,6 +289,12 @@ class ContainerMerge {
     MadeFolders made;
     auto claim = claim_container(job, made);
     if (!claim) return claim.error();
+    if (is_file(output)) {  // of a merge that was killed at its very end
+      remove_or_note(part_of(container_manifest(job)));
+      report_.shards = 0;
+      report_.layers = head_.layer_count;
+      return {};
+    }
     auto container = JobContainer::open(job, {});
     if (!container) return container.error();
     container_.emplace(std::move(*container));
@@ -307,6 +313,12 @@ class ContainerMerge {
   }
 
  private:
+  /// Whether a container has all layers of the same job.
+  bool is_whole(const std::string& path) const {
+    const auto there = read_manifest(path + "/manifest.json");
+    return there && same_job(there->head, head_) && covers_all(there->head);
+  }
+
   Status add_files(ManifestWriter& writer) {
     const Shard& first = shards_.front();
     const bool program = !head_.machine.empty();

@@ -77,7 +77,7 @@ TEST_F(Containers, AreReadLikeDirectories) {
   EXPECT_TRUE(text("one.planes") == text("two.planes"));
   lamina("report packed.zip -o one.html --quiet");
   lamina("report out -o two.html --quiet");
-  EXPECT_EQ(text("one.html").size(), text("two.html").size() + 2 * (std::string("packed.zip").size() - 3));
+  EXPECT_EQ(text("one.html").size(), text("two.html").size() + std::string("packed.zip").size() - 3);
 }
 
 TEST_F(Containers, ContinueAfterAnyInterruptionWithTheSameBytes) {
@@ -131,7 +131,7 @@ TEST_F(Containers, DamageIsFoundAndMadeAgain) {
   lamina(kWithProgram + " -o out.zip --container zip --quiet --resume");
   EXPECT_TRUE(text("out.zip") == whole);
   write_text(directory_ / "out.zip", whole.substr(0, whole.size() - 30));
-  EXPECT_NE(lamina("verify out.zip", 5).err.find("out.zip"), std::string::npos);
+  EXPECT_NE(lamina("verify out.zip", 5).err.find("its end is missing"), std::string::npos);
 }
 
 TEST_F(Containers, ShardsAreMergedIntoADirectoryOrAContainer) {
@@ -153,7 +153,7 @@ TEST_F(Containers, ABatchWritesAFileForEachJob) {
   const std::vector<std::string> expected{"batch.jsonl", "named.zip", "part.zip", "summary.json", "summary.tsv"};
   EXPECT_EQ(files_below(directory_ / "out"), expected);
   lamina("verify out --quiet");
-  const std::string again = lamina("batch jobs.txt -o out --container zip --resume").out;
+  const std::string again = lamina("batch jobs.txt -o out --container zip --resume").err;
   EXPECT_NE(again.find("kept"), std::string::npos) << again;
 }
 

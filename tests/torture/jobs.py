@@ -59,10 +59,10 @@ def resumed(name, arguments, other_part=NUT, out="out"):
                other=[arguments[0], other_part, *arguments[2:], *common], counts_layers=out == "out")
 
 
-def merged(more=()):
+def merged(more=(), ending=""):
     job = ["jet", NIST, "--dpi", "300", "--layer", "0.1", "--quiet", *more]
-    shards = [[*job, "--shard", f"{i}/4", "-o", f"s{i}"] for i in (1, 2, 3, 4)]
-    merge = ["merge", "s1", "s2", "s3", "s4", "-o", "out", "--quiet"]
+    shards = [[*job, "--shard", f"{i}/4", "-o", f"s{i}{ending}"] for i in (1, 2, 3, 4)]
+    merge = ["merge", *(f"s{i}{ending}" for i in (1, 2, 3, 4)), "-o", f"out{ending}", "--quiet"]
     return Job(" ".join(["merge of 4 shards", *more]), merge, merge, before=shards, whole=[*job, "-o", "out"])
 
 
@@ -181,6 +181,13 @@ def all_jobs():
         jet("jet, print program", [NUT, *nuferbj], CROWN),
         jet("jet, two materials", [NUT, CROWN, "--material", "steel,bronze", "--bed", "60x40", "--dpi", "600", "--layer", "0.05"], CROWN),
         jet("jet, segmented with shell", [NUT, *filled, "--bed", "60x60"], CROWN),
+        jet("jet, container", [NIST, "--dpi", "300", "--layer", "0.05", "--container", "zip"]),
+        jet("jet, container with a program and inspection", [NUT, *nuferbj, "--inspect", "--container", "zip"], CROWN),
+        jet("jet, container of two materials", [NUT, CROWN, "--material", "steel,bronze", "--bed", "60x40", "--dpi", "600", "--layer",
+                                                "0.1", "--container", "zip", "--sync", "layer"], CROWN),
+        over_another("container over an older one", ["jet", NUT, "--dpi", "200", "--layer", "0.5", "--container", "zip"],
+                     ["jet", NIST, "--dpi", "300", "--layer", "0.1", "--container", "zip"]),
+        merged(["--container", "zip"], ".zip"),
         over_another("jet over an older job", ["jet", NUT, "--dpi", "200", "--layer", "0.5"],
                      ["jet", NIST, "--dpi", "300", "--layer", "0.1"]),
         over_another("slice over an older job", ["slice", NIST, "--layer", "0.5"], ["slice", NIST, *lines]),

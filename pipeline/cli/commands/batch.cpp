@@ -62,6 +62,7 @@ CommandSpec batch_spec() {
       {"--shard", "I/N", "run share I of N of the jobs, I from 1; see lamina merge", "", "Shares"},
       {"--plan-shares", "N", "plan N shares by dry runs in DIR/shares.tsv; run no job", "", "Shares"},
       {"--status", "", "print the progress of the batch in directory LIST", "", "Shares"},
+      progress_option(),
       {"--json", "", "print the result as one JSON object on stdout", "", "Run"},
       {"--quiet", "", "print errors only, one line per failed job", "", "Run"}};
   spec.closing =
@@ -123,7 +124,10 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
 /// One line per job, with a status line below on a terminal.
 class BatchConsole {
  public:
-  BatchConsole(bool quiet, Context& context) : context_(context), quiet_(quiet), terminal_(is_terminal()) {}
+  BatchConsole(const Arguments& arguments, Context& context)
+      : context_(context),
+        quiet_(arguments.has("--quiet")),
+        terminal_(is_terminal() && arguments.text("--progress") != "json") {}
 
   void ended(const BatchJob& job, const BatchResult& result, const BatchState& state) {
     if (quiet_) {
@@ -135,6 +139,7 @@ class BatchConsole {
   }
 
   void progress(const BatchState& state) {
+    context_.progress({ProgressEvent::Stage::kJobs, state.ended, state.total});
     if (quiet_ || !terminal_) return;
     context_.say_text(line_.draw(progress_line(state), terminal_columns()));
   }
@@ -176,7 +181,7 @@ Outcome print_status(const Arguments& arguments, Context& context) {
 /// Plans the shares and reports their costs.
 Outcome plan_only(std::vector<BatchEntry> entries, const BatchShare& share, const BatchOptions& options,
                   const std::vector<std::string>& with, const Arguments& arguments, Context& context) {
-  BatchConsole console(arguments.has("--quiet"), context);
+  BatchConsole console(arguments, context);
   keep_on_signals();
   BatchState state;
   state.total = static_cast<std::uint32_t>(entries.size());
@@ -229,7 +234,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   if (!prepared) return prepared.error();
   const auto jobs = std::make_shared<const std::vector<BatchJob>>(std::move(*prepared));
 
-  BatchConsole console(quiet, context);
+  BatchConsole console(arguments, context);
   keep_on_signals();  // jobs that are done
   BatchWatcher watcher;
   watcher.progress = [&](const BatchState& state) { console.progress(state); };

@@ -62,6 +62,7 @@ CommandSpec nest_spec() {
                        {"--quote", "", "print hours, material and prices; write no job", "", "Run"},
                        {"--quote-density", "PERCENT", "--quote, and prices at a box fill of PERCENT", "", "Run"},
                        {"--dry-run", "", "print the result and write nothing", "", "Run"},
+                       progress_option(),
                        {"--json", "", "print the result as one JSON object on stdout", "", "Run"},
                        {"--quiet", "", "print errors only", "", "Run"}});
   spec.closing =
@@ -224,7 +225,7 @@ Outcome add_parts(const Arguments& arguments, Context& context) {
   for (const OptionSpec& option : nest_spec().options) {
     const std::string flag = option.flag.substr(option.flag.find("--"));
     constexpr std::array kUsed{"--into",  "--add",           "--copies",  "--turns", "--keep-out", "--threads",
-                               "--quote", "--quote-density", "--dry-run", "--json",  "--quiet"};
+                               "--quote", "--quote-density", "--dry-run", "--progress", "--json", "--quiet"};
     if (arguments.has(flag) && std::ranges::find(kUsed, flag) == kUsed.end())
       return usage("--into: {} is that of the build; leave it out", flag);
   }

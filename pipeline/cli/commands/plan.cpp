@@ -79,6 +79,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
     spec.options.push_back({"--cache", "FOLDER", "take the files of an equal job from a cache, or add them", "", "Run"});
     spec.options.push_back({"--cache-link", "", "make read-only hard links to the cache, no copies", "", "Run"});
   }
+  spec.options.push_back(progress_option());
   spec.options.push_back({"--json", "", "print the result as one JSON object on stdout", "", "Run"});
   spec.options.push_back({"--quiet", "", "print errors only", "", "Run"});
   spec.more = row.closing;
