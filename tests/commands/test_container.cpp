@@ -77,7 +77,7 @@ TEST_F(Containers, AreReadLikeDirectories) {
   EXPECT_TRUE(text("one.planes") == text("two.planes"));
   lamina("report packed.zip -o one.html --quiet");
   lamina("report out -o two.html --quiet");
-  EXPECT_EQ(text("one.html").size(), text("two.html").size() + std::string("packed.zip").size() - 3);
+  EXPECT_TRUE(text("one.html") == text("two.html"));
 }
 
 TEST_F(Containers, ContinueAfterAnyInterruptionWithTheSameBytes) {
