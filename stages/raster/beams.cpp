@@ -52,7 +52,7 @@ struct Copies {
 
 /// A ray towards +x, and what it carries through the tree. Its position is in nm, for copies see it from their own frames.
 struct Beam {
-  RTCIntersectContext context;
+  RayContext context;
   std::int64_t x, y, z;
   std::int64_t low, high;      // y of the first and the last row of the band
   std::uint32_t instance = 0;  // the copy in which it is
@@ -73,8 +73,7 @@ void shoot(Beam& beam, RTCScene scene, Point3 offset) {
   ray.ray.mask = ~0u;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcInitIntersectContext(&beam.context);
-  rtcIntersect1(scene, &beam.context, &ray);
+  trace(scene, beam.context, ray);
 }
 
 void run_bounds(const RTCBoundsFunctionArguments* arguments) {

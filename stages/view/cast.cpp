@@ -85,8 +85,7 @@ struct Caster::State {
 
   /// How light the facet is that a ray meets first; negative if it meets none. The parts lie between the two depths, mm.
   float light(const ViewFrame& frame, const RayVector& origin, float first_depth, float last_depth) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    RayContext context;
     RTCRayHit ray{};
     ray.ray.org_x = origin[0], ray.ray.org_y = origin[1], ray.ray.org_z = origin[2];
     RayVector way{};
@@ -95,7 +94,7 @@ struct Caster::State {
     ray.ray.tfar = std::numeric_limits<float>::infinity();
     ray.ray.mask = ~0u;
     ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene, &context, &ray);
+    trace(scene, context, ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return -1;
     const RayVector normal = {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z};
     const auto of = [&](int axis) { return normal[static_cast<std::size_t>(axis)]; };
