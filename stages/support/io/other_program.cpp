@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -45,7 +46,8 @@ Status check_address_space(const std::string& program) {
 /// The program in this one's folder, or its name for PATH.
 std::string find_program(const std::string& program) {
   std::error_code error;
-  const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe", error);
+  const char* const launcher = std::getenv("LAMINA_PROGRAM");  // of the portable archive (packaging/launcher.c)
+  const std::filesystem::path own = launcher != nullptr ? launcher : std::filesystem::read_symlink("/proc/self/exe", error);
   const std::filesystem::path neighbour = own.parent_path() / program;
   return !error && std::filesystem::exists(neighbour, error) ? neighbour.string() : program;
 }
