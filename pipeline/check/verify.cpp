@@ -422,6 +422,18 @@ Result<VerifyReport> verify_file(const std::string& path, const VerifyOptions& o
   return report;
 }
 
+/// The sums that unpackers of a container check.
+void check_sums(const std::string& container, VerifyReport& report) {
+  const auto entries = read_entries(container);
+  if (!entries) return report.add(entries.error().message);
+  std::vector<char> holds(entries->size());
+  tbb::parallel_for(std::size_t{0}, holds.size(),
+                    [&](std::size_t i) { holds[i] = has_its_sum(container, (*entries)[i]) ? 1 : 0; });
+  for (std::size_t i = 0; i < holds.size(); ++i) {
+    if (holds[i] == 0) report.add(fmt::format("{}: its CRC-32 in the container differs", (*entries)[i].name));
+  }
+}
+
 Result<VerifyReport> verify_any(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
   if (!is_container(directory) && fs::is_regular_file(directory, error)) {
@@ -443,6 +455,7 @@ Result<VerifyReport> verify_any(const std::string& directory, const VerifyOption
   }
   VerifyReport report;
   report.directory = directory;
+  if (is_container(directory)) check_sums(directory, report);
   const std::vector<ManifestFile> files = find_manifests(directory);
   if (files.empty()) {
     return Error{Fault::kVerification, fmt::format("{}: contains no manifest.json; it is not a finished job", directory)};

@@ -22,12 +22,11 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr const Command* kCommands[] = {&jet_command,     &slice_command,        &heights_command,    &extrude_command,
-                                        &info_command,    &export_command,       &verify_command,     &calibrate_command,
-                                        &compare_command, &permeability_command, &design_command,     &merge_command,
-                                        &stream_command,  &convert_command,      &machines_command,   &preview_command,
-                                        &report_command,  &batch_command,        &watch_command,      &cache_command,
-                                        &nest_command,    &completion_command,   &manual_command};
+constexpr const Command* kCommands[] = {
+    &jet_command,    &slice_command,     &heights_command,  &extrude_command,      &info_command,   &export_command,
+    &verify_command, &calibrate_command, &compare_command,  &permeability_command, &design_command, &merge_command,
+    &stream_command, &convert_command,   &machines_command, &preview_command,      &report_command, &batch_command,
+    &watch_command,  &cache_command,     &nest_command,     &completion_command,   &manual_command};
 
 std::string program_help() {
   std::string text =
@@ -136,7 +135,10 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
     arguments = std::move(*read);
   }
   console.quiet = arguments.has("--quiet");
-  console.json = arguments.text("--progress") == "json";
+  const std::string progress = arguments.text("--progress");
+  if (!progress.empty() && progress != "auto" && progress != "json")
+    return at_option("--progress", fmt::format("'{}' is no kind of progress; give auto or json", one_line(progress)));
+  if (progress == "json") console.begin_json();
   return run(command, arguments, console);
 }
 

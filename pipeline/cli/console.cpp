@@ -14,6 +14,7 @@
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 #include "stages/support/text/terminal.h"
 
 namespace lamina::pipeline {
@@ -22,7 +23,7 @@ namespace {
 // 0 or the reason.
 int write_all(int file, std::string_view text) { return lamina::write_all(file, std::as_bytes(std::span(text))); }
 
-std::atomic<bool> interrupted{false}, keeping{false};
+std::atomic<bool> interrupted{false}, keeping{false}, prints_json{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch nothing else
 
 [[noreturn]] void end() {
@@ -40,13 +41,21 @@ timer_t patience;  // runs out kPatience after the first signal
 std::atomic<bool> patient{false};
 constexpr itimerspec kPatience{{0, 0}, {0, 800'000'000}};
 
-/// Ends a program that works on in spite of a signal, within a layer or a library. Finished layers are on record, and files
-/// have their names only once they are whole.
-void on_patience(int) {
-  constexpr std::string_view kLine = "lamina: interrupted; layers on record stay for --resume\n";
-  if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) end();
+void put_piece(std::string_view text) {
+  if (::write(STDERR_FILENO, text.data(), text.size()) < 0) end();
+}
+
+/// Of a signal handler: a line, as JSON if that is requested.
+[[noreturn]] void end_with(std::string_view what) {
+  put_piece(prints_json ? "{\"event\":\"error\",\"text\":\"" : "lamina: ");
+  put_piece(what);
+  put_piece(prints_json ? "\",\"code\":130}\n{\"event\":\"end\",\"code\":130}\n" : "\n");
   end();
 }
+
+/// Ends a program that works on in spite of a signal, within a layer or a library. Finished layers are on record, and files
+/// have their names only once they are whole.
+void on_patience(int) { end_with("interrupted; layers on record stay for --resume"); }
 
 /// From now on a signal ends the program within a second.
 void lose_patience() {
@@ -63,8 +72,7 @@ void lose_patience() {
 
 void on_signal(int signal) {
   if (!keeping) {
-    constexpr std::string_view kLine = "lamina: interrupted before the first layer\n";
-    if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) end();
+    end_with("interrupted before the first layer");
   }
   const bool again = interrupted.exchange(true);
   if (again && signal == SIGXCPU) return;  // comes every second once the limit is reached
@@ -110,6 +118,8 @@ void handle_signals() {
 
 Console::~Console() { Console::say_text({}); }
 
+void Console::begin_json() { json_ = prints_json = true; }
+
 void Console::put(const Json& line) {
   const std::lock_guard lock(writing_);
   write_all(STDERR_FILENO, json_line(line));
@@ -132,14 +142,14 @@ void Console::put(const ProgressEvent& event) {
 }
 
 int Console::end(int code) {
-  if (!json) return code;
+  if (!json_) return code;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
   put(Json{{"event", "end"}, {"code", code}, {"seconds", seconds}});
   return code;
 }
 
 void Console::say_text(std::string_view text) {
-  while (json && !text.empty()) {
+  while (json_ && !text.empty()) {
     const std::size_t line = std::min(text.find('\n'), text.size());
     if (line > 0) put(Json{{"event", "message"}, {"text", one_line(text.substr(0, line))}});
     text.remove_prefix(std::min(line + 1, text.size()));
@@ -149,7 +159,7 @@ void Console::say_text(std::string_view text) {
 }
 
 int Console::complain(const Error& error) {
-  if (json) {
+  if (json_) {
     put(Json{{"event", "error"}, {"text", one_line(error.message)}, {"code", static_cast<int>(error.fault)}});
     return static_cast<int>(error.fault);
   }
@@ -170,7 +180,7 @@ void Console::progress(const ProgressEvent& event) {
   const bool counted = event.stage == Stage::kLayers || event.stage == Stage::kBuilds;
   if (counted) keep_on_signals();
   if (event.stage == Stage::kLayers) lose_patience();  // builds are removed after a signal, which may take longer
-  if (json) return put(event);
+  if (json_) return put(event);
   if (event.stage == Stage::kJobs) return;  // a batch draws its own line
   if (!progress_) {
     using Style = Progress::Style;

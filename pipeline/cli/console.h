@@ -24,15 +24,17 @@ class Console : public Context {
   const std::atomic<bool>& cancel() override;
 
   bool quiet = false;  // suppresses progress
-  bool json = false;   // of --progress json: each line of standard error is a JSON object
 
-  /// With `json`: the last line. returns  the exit code
+  /// From here on each line of standard error is a JSON object (--progress json).
+  void begin_json();
+  /// Prints the last of these lines. returns  the exit code
   int end(int code);
 
  private:
   void put(const Json& line);
   void put(const ProgressEvent& event);
   std::optional<Progress> progress_;
+  bool json_ = false;
   std::mutex writing_;                 // of JSON lines
   std::optional<ProgressEvent> last_;  // as JSON
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now(), put_at_;

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
 #include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 
@@ -82,7 +85,7 @@ Status check_job(const Job& job) {
     if ((job.layers || job.shard) && job.inspect)
       return usage(
           "--container: sections that --inspect keeps of some layers need a directory; inspect all layers, or remove it");
-    if (output_of(job.output, job.container) != job.output)
+    if (!job.output.empty() && !names_container(job.output))
       return usage("-o {}: a container is a ZIP file; end its name with .zip", job.output);
   }
   if (job.output.empty() && !job.dry_run)
@@ -90,12 +93,17 @@ Status check_job(const Job& job) {
   return {};
 }
 
-constexpr std::string_view kContainerEnd = ".zip";
+bool names_container(std::string_view path) {
+  constexpr std::size_t kBytes = 4;
+  return path.size() >= kBytes && lower_case(std::string(path.substr(path.size() - kBytes))) == ".zip";
+}
 
 std::string output_of(std::string output, Container container) {
-  if (container == Container::kNone || output.empty() || output.ends_with(kContainerEnd)) return output;
+  if (container == Container::kNone || is_stream(output)) return output;
   while (output.size() > 1 && output.ends_with('/')) output.pop_back();
-  return output += kContainerEnd;
+  const std::string name = std::filesystem::path(output).filename().string();
+  if (name.empty() || name == "." || name == ".." || names_container(output)) return output;
+  return output += ".zip";
 }
 
 Result<heights::Options> heights_options(const Job& job) { return heights::options_of(job.heights, job.layer_mm); }

@@ -221,7 +221,10 @@ struct Job {
 /// errors  kUsage, one line that begins with the key
 Status check_job(const Job& job);
 
-/// The name of a job's output: with a container, DIR becomes DIR.zip.
+/// Whether the name of a file ends in .zip.
+bool names_container(std::string_view path);
+
+/// The name of a job's output: with a container, DIR becomes DIR.zip. Names of no file stay: `-`, a device, `.` and `..`.
 std::string output_of(std::string output, Container container);
 
 /// Section [heights] as checked options of the stage. errors  kUsage, one line that begins with the key

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "pipeline/job/errors.h"
@@ -40,6 +44,14 @@ bool frame_holds(const std::string& container, const ManifestHead& head, bool en
          (!end || fault_of_file(container, "program/end" + extension, head.program_end).empty());
 }
 
+/// How many entries, from the first on, have the CRC that unpackers check.
+std::size_t count_with_sums(const std::string& container, std::span<const ContainerEntry> entries) {
+  std::vector<char> holds(entries.size());
+  tbb::parallel_for(std::size_t{0}, entries.size(),
+                    [&](std::size_t i) { holds[i] = has_its_sum(container, entries[i]) ? 1 : 0; });
+  return static_cast<std::size_t>(std::ranges::find(holds, 0) - holds.begin());
+}
+
 /// What of the begun container is kept: layers without a gap from the first on, whose entries come in the order of the job.
 Result<KeptContainer> kept_of_begun(const std::string& part, const ManifestHead& head, std::vector<LayerRecord> layers) {
   KeptContainer kept;
@@ -54,7 +66,8 @@ Result<KeptContainer> kept_of_begun(const std::string& part, const ManifestHead&
   const std::vector<std::string> names = names_up_to(head, layers, ends);
   std::size_t same = 0;
   while (same < names.size() && same < entries->size() && (*entries)[same].name == names[same]) ++same;
-  while (!ends.empty() && ends.back() > same) ends.pop_back();
+  const std::size_t whole = count_with_sums(part, std::span(*entries).first(same));
+  while (!ends.empty() && ends.back() > whole) ends.pop_back();
   if (ends.empty()) return kept;
   layers.resize(ends.size());
   kept.layers = std::move(layers);
@@ -67,6 +80,13 @@ Result<KeptContainer> kept_of_begun(const std::string& part, const ManifestHead&
 Status check_not_begun(const Job& job) {
   if (job.resume || job.overwrite || !has_manifest_head(part_of(container_manifest(job)))) return {};
   return usage("{}: an interrupted job; continue with --resume, or start over with --overwrite", part_of(job.output));
+}
+
+/// Other programs use names in .part too.
+Status check_part_is_ours(const Job& job) {
+  constexpr std::array<std::string_view, 1> kMarks = {"^PK\x03\x04"};
+  if (is_replaceable(part_of(job.output), kMarks)) return {};
+  return usage("{}: is no unfinished container of lamina; remove it, or name another file with -o", part_of(job.output));
 }
 
 }  // namespace
@@ -85,6 +105,7 @@ Status check_container(const Job& job) {
   if (Status busy = check_not_being_written(container_manifest(job)); !busy) return busy;
   if (fs::exists(status) && job.resume && !is_container(job.output))
     return usage("{}: is no container of a job, which --resume continues; name another file with -o", job.output);
+  if (Status ours = check_part_is_ours(job); !ours) return ours;
   if (job.resume || job.overwrite) return {};
   if (fs::exists(status) && is_container(job.output))
     return usage("{}: a finished job; replace it with --overwrite, check and keep it with --resume, or name another file",
@@ -110,20 +131,29 @@ Result<KeptContainer> find_kept_container(const Job& job, const ManifestHead& he
   if (is_file(part) && has_manifest_head(part_of(container_manifest(job)))) {
     auto layers = layers_that_hold(part, container_manifest(job), head);
     if (!layers) return layers.error();
-    return kept_of_begun(part, head, std::move(*layers));
+    auto kept = kept_of_begun(part, head, std::move(*layers));
+    if (kept) kept->replaces = is_container(job.output);
+    return kept;
   }
   KeptContainer kept;
   if (!is_file(job.output)) return kept;
+  if (!is_file(job.output + "/" + manifest_name(job)))
+    return usage("{}: contains no {}, as this job does; name another file with -o, or replace it with --overwrite", job.output,
+                 manifest_name(job));
+  kept.replaces = true;
   auto layers = layers_that_hold(job.output, job.output + "/" + manifest_name(job), head);
   if (!layers) return layers.error();
+  const auto entries = read_entries(job.output);
+  if (!entries) return entries.error();
   kept.finished = layers->size() == head.last_layer - head.first_layer && frame_holds(job.output, head, true) &&
+                  count_with_sums(job.output, *entries) == entries->size() &&
                   (!job.inspect || read_inspection(job.output, head));
   if (kept.finished) kept.layers = std::move(*layers);
   return kept;
 }
 
 Result<JobContainer> JobContainer::open(const Job& job, const KeptContainer& kept) {
-  FileOptions how{.keep_part = true, .replace = job.resume || job.overwrite};
+  FileOptions how{.keep_part = true, .replace = kept.replaces || job.overwrite};
   if (job.sync == Sync::kOff) how.durable = Durable::kNo;
   auto file = kept.entries.empty() ? File::open(job.output, how) : File::reopen(job.output, kept.end, how);
   if (!file) return file.error();

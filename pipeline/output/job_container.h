@@ -27,7 +27,8 @@ namespace lamina::pipeline {
 std::string container_manifest(const Job& job);
 
 /// Checks that a job may write its container. Changes nothing.
-/// errors  kUsage: a job is there, without --resume or --overwrite; kOutput: a directory, or another run writes it
+/// errors  kUsage: a job is there, without --resume or --overwrite, or somebody else's NAME.part; kOutput: a directory, or
+///         another run writes it
 Status check_container(const Job& job);
 
 /// Claims the container for the rest of the run and makes the folders above it. errors  of check_container and Claim::take
@@ -39,11 +40,12 @@ struct KeptContainer {
   std::vector<ContainerEntry> entries;  // up to the last of those layers
   std::uint64_t end = 0;                // offset behind them
   bool finished = false;                // under its final name, with all layers
+  bool replaces = false;                // what has the final name is a container that the job may replace
 };
 
 /// A finished container that lacks layers, or has damaged ones, is not continued: all layers are made again.
-/// errors  of layers_that_hold
-/// cost    reads every file once
+/// errors  of layers_that_hold; kUsage: the container is of other layers or another program
+/// cost    reads every file twice
 Result<KeptContainer> find_kept_container(const Job& job, const ManifestHead& head);
 
 class JobContainer {

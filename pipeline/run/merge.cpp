@@ -284,12 +284,14 @@ class ContainerMerge {
     if (is_file(output) && !is_whole(output)) return usage("{}: is there already; name another file with -o", output);
     Job job;
     job.output = output;
-    job.resume = true;  // of a merge that was killed, nothing is kept
+    const auto begun = read_manifest_head(part_of(container_manifest(job)));
+    // Of a merge that was killed nothing is kept, and it starts again.
+    job.resume = is_file(output) || (begun && same_job(*begun, head_) && covers_all(*begun));
     if (Status status = check_container(job); !status) return status;
     MadeFolders made;
     auto claim = claim_container(job, made);
     if (!claim) return claim.error();
-    if (is_file(output)) {  // of a merge that was killed at its very end
+    if (is_file(output) && is_whole(output)) {  // of a merge that was killed at its very end
       remove_or_note(part_of(container_manifest(job)));
       report_.shards = 0;
       report_.layers = head_.layer_count;
@@ -382,8 +384,8 @@ Result<MergeReport> merge(const MergeRequest& request) {
     return unmatched(report.warnings.back().text + "; without inspection, merge into another directory");
   if (Status status = checks::refuse_warnings(report.warnings); request.strict && !status) return status.error();
   report.shards = static_cast<std::uint32_t>(shards->size());
-  const Status merged = output.ends_with(".zip") ? ContainerMerge(*shards, report).run(output, inspection)
-                                                 : merge_into_directory(*shards, output, inspection, report);
+  const Status merged = names_container(output) ? ContainerMerge(*shards, report).run(output, inspection)
+                                                : merge_into_directory(*shards, output, inspection, report);
   return merged ? Result<MergeReport>(report) : merged.error();
 }
 

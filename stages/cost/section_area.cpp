@@ -18,7 +18,7 @@ double swept(const std::array<CutCorner, 3>& corners, double z) {
     if ((a[2] < z) == (b[2] < z)) continue;
     const double t = (z - a[2]) / (b[2] - a[2]);
     // A corner of the cut on an edge that goes up is its end: viewed from outside, the solid is on the left.
-    (a[2] < z ? to : from) = {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
+    (a[2] < z ? to : from) = std::array{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
   }
   return from[0] * to[1] - from[1] * to[0];
 }

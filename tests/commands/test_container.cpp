@@ -157,6 +157,55 @@ TEST_F(Containers, ABatchWritesAFileForEachJob) {
   EXPECT_NE(again.find("kept"), std::string::npos) << again;
 }
 
+TEST_F(Containers, ResumeKeepsWhatIsNotOfTheJob) {
+  const std::string container = " --container zip --quiet";
+  lamina(kBoxJob + " -o out" + container + " --shard 1/2");
+  expect_refused(kBoxJob + " -o out --resume --shard 2/2" + container, 2, "contains no manifest-2-of-2.json", directory_);
+  expect_refused(kBoxJob + " -o out --resume" + container, 2, "contains no manifest.json", directory_);
+  write_text(directory_ / "mine.zip.part", "a download that another program has begun");
+  expect_refused(kBoxJob + " -o mine" + container, 2, "is no unfinished container", directory_);
+  // The begun job of a name is not replaced by a merge.
+  lamina(kBoxJob + " -o other" + container + " --shard 2/2");
+  lamina(kWithProgram + " -o begun" + container);
+  write_text(directory_ / "begun.zip.json.part", *read_file(directory_ / "begun.zip/manifest.json", {}));
+  fs::rename(directory_ / "begun.zip", directory_ / "begun.zip.part");
+  expect_refused("merge out.zip other.zip -o begun.zip", 2, "an interrupted job", directory_);
+}
+
+TEST_F(Containers, SumsAndNamesThatUnpackersCheckAreChecked) {
+  lamina(kBoxJob + " -o out --container zip --quiet");
+  const std::string whole = text("out.zip");
+  const auto entries = read_entries(directory_ / "out.zip");
+  const auto manifest = read_file(directory_ / "out.zip/manifest.json", {});
+  ASSERT_TRUE(entries.ok() && manifest.ok());
+  std::string damaged = whole;
+  damaged[(*entries)[10].header + 14] ^= 4;  // the CRC-32 before the data
+  write_text(directory_ / "out.zip", damaged);
+  EXPECT_NE(lamina("verify out.zip", 5).err.find((*entries)[10].name), std::string::npos);
+  fs::remove(directory_ / "out.zip");
+  write_text(directory_ / "out.zip.part", damaged);
+  write_text(directory_ / "out.zip.json.part", *manifest);
+  lamina(kBoxJob + " -o out --container zip --quiet --resume");
+  EXPECT_TRUE(text("out.zip") == whole);
+  // A second file of one name: unpackers take the last one.
+  std::string twice = whole;
+  for (std::size_t at = twice.find("000003.tif"); at != std::string::npos; at = twice.find("000003.tif")) twice[at + 5] = '2';
+  write_text(directory_ / "out.zip", twice);
+  EXPECT_NE(lamina("verify out.zip", 5).err.find("occurs twice"), std::string::npos);
+}
+
+TEST_F(Containers, NamesOfNoFileAreRefused) {
+  for (const char* name : {".", "..", "-", "/dev/null"})
+    expect_refused(kBoxJob + " --container zip -o " + name, 2, "end its name with .zip", directory_);
+  lamina(kBoxJob + " --container zip --quiet -o a.zip/");
+  lamina(kBoxJob + " --container zip --quiet -o b.ZIP");
+  fs::create_symlink("c-target.zip", directory_ / "c.zip");
+  lamina(kBoxJob + " --container zip --quiet -o c");
+  EXPECT_TRUE(text("a.zip") == text("b.ZIP"));
+  EXPECT_TRUE(text("a.zip") == text("c-target.zip"));
+  EXPECT_TRUE(fs::is_symlink(directory_ / "c.zip"));
+}
+
 TEST_F(Containers, WhatIsThereIsKept) {
   lamina(kBoxJob + " -o out.zip --container zip --quiet");
   write_text(directory_ / "mine.zip", "mine");

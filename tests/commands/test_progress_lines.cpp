@@ -41,6 +41,7 @@ TEST(ProgressLines, ReportStagesMessagesAndTheExitCode) {
     EXPECT_EQ(done, total) << line;
     EXPECT_EQ(of, total) << line;
   }
+  expect_refused("jet part.stl -o none --progress xml", 2, "'xml' is no kind of progress", directory);
   const auto refused = error_objects(run_lamina(words_of("jet absent.stl -o none --progress json"), directory.path()));
   ASSERT_GE(refused.size(), 2u);
   EXPECT_EQ(refused[refused.size() - 2].at("event"), "error");

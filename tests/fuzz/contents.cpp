@@ -2,7 +2,10 @@
 #include <zstd.h>
 
 #include "pipeline/manifest/kept_sections.h"
+#include "stages/formats/zip/zip.h"
 #include "stages/support/io/compressed.h"
+#include "stages/support/io/container.h"
+#include "stages/support/io/file_reader.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -39,6 +42,49 @@ std::vector<std::string> content_seeds() {
   }
   return seeds;
 }
+
+/// Finished, and as an unfinished one.
+bool read_container(std::string_view bytes) {
+  static MemoryFile finished("job.zip"), begun("job.zip.part");
+  bool accepted = false;
+  for (MemoryFile* file : {&finished, &begun}) {
+    const std::string& path = file->hold(bytes);
+    std::uint64_t end = 0, last = 0;
+    const auto entries = read_entries(path, &end);
+    if (!entries) {
+      check_error(entries.error());
+      continue;
+    }
+    law(end <= bytes.size(), "entries end behind the file");
+    for (const ContainerEntry& entry : *entries) {
+      law(entry.header >= last && entry.bytes <= end && entry.header <= end - entry.bytes, "an entry is not within the file");
+      law(entry.name.empty() || !entry.name.ends_with('/'), "a folder is an entry");
+      last = entry.header + entry.bytes;
+      accepted |= has_its_sum(path, entry);
+    }
+  }
+  return accepted;
+}
+
+std::vector<std::string> container_seeds() {
+  std::vector<std::string> seeds;
+  for (const std::uint64_t zip64_from : {std::uint64_t{UINT32_MAX}, std::uint64_t{0}}) {
+    static MemoryFile made("made.zip");
+    const std::string path = made.hold("");
+    auto file = File::open(path);
+    if (!file) continue;
+    formats::ZipWriter writer(*file, formats::kFirstZipDate, zip64_from);
+    for (const std::string_view name : {"layers/000000.tif", "manifest.json"}) {
+      const auto content = std::as_bytes(std::span(name));
+      static_cast<void>(writer.store(name, content, formats::crc_of(content)));
+    }
+    if (!writer.finish() || !file->finish()) continue;
+    if (const auto text = read_file(path, {})) seeds.push_back(*text);
+  }
+  return seeds;
+}
+
+const Registered kContainer({"container", read_container, container_seeds, "stages/support/io/container", ".zip"});
 
 const Registered kContents({"contents", read_content_of, content_seeds, "stages/support/io/compressed", ""});
 

@@ -120,6 +120,9 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->quiet = arguments.has("--quiet");
   job->leave_to_machine = true;
   job->output = output_of(std::move(job->output), job->container);
+  if (job->container != Container::kNone) {  // a link leads to the file that grows, and to its record
+    if (const auto target = find_target(job->output); target && !target->file.empty()) job->output = target->file;
+  }
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;

@@ -9,6 +9,14 @@
 namespace lamina::load {
 namespace {
 
+#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9  // Debian 13
+std::uint64_t line_of(XML_Parser parser) { return XML_GetCurrentLineNumber64(parser); }
+std::int64_t byte_of(XML_Parser parser) { return XML_GetCurrentByteIndex64(parser); }
+#else
+std::uint64_t line_of(XML_Parser parser) { return XML_GetCurrentLineNumber(parser); }
+std::int64_t byte_of(XML_Parser parser) { return XML_GetCurrentByteIndex(parser); }
+#endif
+
 constexpr std::uint32_t kDeepestXml = 256;
 constexpr std::size_t kMaxNames = 4096, kMaxNamespaces = 64, kLongestName = 1024;
 constexpr std::uint64_t kLongestTag = std::uint64_t{1} << 20;
@@ -90,7 +98,7 @@ XmlName XmlReader::find(std::string_view name, bool is_element) const {
 
 XmlName XmlReader::attribute_name(std::string_view name) const { return find(name, false); }
 
-std::uint64_t XmlReader::line() const { return XML_GetCurrentLineNumber(parser_); }
+std::uint64_t XmlReader::line() const { return line_of(parser_); }
 
 void XmlReader::want_text(bool wanted) { XML_SetCharacterDataHandler(parser_, wanted ? Callbacks::text : nullptr); }
 
@@ -115,7 +123,7 @@ bool XmlReader::parse(std::string_view bytes, bool last) {
 bool XmlReader::feed(std::string_view bytes) {
   fed_ += bytes.size();
   if (!parse(bytes, false)) return false;
-  const XML_Index at = XML_GetCurrentByteIndex(parser_);
+  const std::int64_t at = byte_of(parser_);
   if (at >= 0 && fed_ - static_cast<std::uint64_t>(at) > kLongestTag + bytes.size())
     refuse(fmt::format("has a tag of more than {} bytes, or a comment; export it again", kLongestTag));
   return fault_.empty();

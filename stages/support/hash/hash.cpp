@@ -63,12 +63,11 @@ Result<FileDigest> digest_file(const std::string& path, std::optional<std::uint6
   std::vector<char> piece(static_cast<std::size_t>(std::min<std::uint64_t>(file->size() + 1, 256 << 10)));
   FileDigest digest;
   while (true) {
-    const ssize_t got = ::read(file->descriptor(), piece.data(), piece.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return Error{Fault::kVerification, fmt::format("{}: {}", path, std::strerror(errno))};
-    digest.bytes += static_cast<std::uint64_t>(got);
-    hasher.add(std::as_bytes(std::span(piece).first(static_cast<std::size_t>(got))));
-    if (static_cast<std::size_t>(got) < piece.size()) break;  // of a regular file: its end
+    const auto got = file->read(piece);
+    if (!got) return got.error();
+    digest.bytes += *got;
+    hasher.add(std::as_bytes(std::span(piece).first(*got)));
+    if (*got < piece.size()) break;  // of a regular file: its end
   }
   digest.hash = hasher.take();
   return digest;

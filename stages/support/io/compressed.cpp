@@ -199,19 +199,17 @@ namespace {
 /// What has the frame's or the file's bytes.
 class StoredReader {
  public:
-  explicit StoredReader(const FileReader& file) : file_(file), piece_(kContentPiece) {}
+  explicit StoredReader(FileReader& file) : file_(file), piece_(kContentPiece) {}
 
   /// The next bytes, empty at the end. errors  kVerification
   Result<std::span<const std::byte>> next() {
-    while (true) {
-      const ssize_t got = ::read(file_.descriptor(), piece_.data(), piece_.size());
-      if (got >= 0) return std::span<const std::byte>(piece_.data(), static_cast<std::size_t>(got));
-      if (errno != EINTR) return damaged_content(file_.path(), std::strerror(errno));
-    }
+    const auto got = file_.read({reinterpret_cast<char*>(piece_.data()), piece_.size()});
+    if (!got) return got.error();
+    return std::span<const std::byte>(piece_.data(), *got);
   }
 
  private:
-  const FileReader& file_;
+  FileReader& file_;
   std::vector<std::byte> piece_;
 };
 
@@ -231,7 +229,7 @@ using Take = std::function<Status(std::span<const std::byte>)>;
 
 class FrameReader {
  public:
-  FrameReader(const FileReader& file, std::uint64_t max_bytes, const Take& take)
+  FrameReader(FileReader& file, std::uint64_t max_bytes, const Take& take)
       : file_(file), take_(take), max_(max_bytes), out_(kContentPiece) {}
 
   Status run() {
@@ -274,7 +272,7 @@ class FrameReader {
     return {};
   }
 
-  const FileReader& file_;
+  FileReader& file_;
   const Take& take_;
   std::uint64_t max_, size_ = 0;
   std::vector<std::byte> out_;
@@ -287,7 +285,7 @@ Result<FileReader> open_stored(const std::string& path) { return FileReader::ope
 }  // namespace
 
 Status expand_file(const std::string& path, std::uint64_t max_bytes, const Take& take) {
-  const auto file = open_stored(path);
+  auto file = open_stored(path);
   if (!file) return file.error();
   if (is_compressed(path)) return FrameReader(*file, max_bytes, take).run();
   if (file->size() > max_bytes) return damaged_content(path, fmt::format("has more than {} bytes", max_bytes));

@@ -6,6 +6,7 @@
 #include <sys/sendfile.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -24,9 +25,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kEntry = "PK\x03\x04", kInDirectory = "PK\x01\x02", kEnd = "PK\x05\x06", kEnd64 = "PK\x06\x06",
-                           kLocator64 = "PK\x06\x07", kManifest = "manifest";
+                           kLocator64 = "PK\x06\x07", kManifest = "manifest.json", kOfShard = "manifest-";
 constexpr std::size_t kEntryHead = 30, kDirectoryHead = 46, kEndBytes = 22, kEnd64Bytes = 56, kLocatorBytes = 20;
-constexpr std::uint64_t kMaxDirectory = 1ull << 30;  // bytes
+constexpr std::uint64_t kMaxDirectory = 256ull << 20, kMaxCopied = 1ull << 30;  // bytes
+constexpr std::uint64_t kUtf8 = 1 << 11;                                        // flag of a name
 
 class Descriptor {
  public:
@@ -104,7 +106,7 @@ std::optional<EntryHead> read_head(int file, std::uint64_t offset, std::uint64_t
   found.data = offset + kEntryHead + text.size();
   if (!widen(std::string_view(text).substr(name), std::array{&found.entry.bytes, &found.packed})) return std::nullopt;
   if (found.data > file_bytes || found.packed > file_bytes - found.data) return std::nullopt;
-  found.stored = little(head, 8, 2) == 0 && found.packed == found.entry.bytes;
+  found.stored = (little(head, 6, 2) & ~kUtf8) == 0 && little(head, 8, 2) == 0 && found.packed == found.entry.bytes;
   return found;
 }
 
@@ -128,8 +130,13 @@ struct DirectoryRange {
 std::optional<DirectoryRange> find_directory(int file, std::uint64_t file_bytes) {
   std::string tail(static_cast<std::size_t>(std::min<std::uint64_t>(file_bytes, kEndBytes + kLocatorBytes + UINT16_MAX)), '\0');
   if (!read_at(file, file_bytes - tail.size(), tail)) return std::nullopt;
-  const std::size_t at = tail.rfind(kEnd);
-  if (at == std::string::npos || tail.size() - at < kEndBytes) return std::nullopt;
+  // The signature may also occur in the comment and in the numbers of the record.
+  std::size_t at = tail.rfind(kEnd);
+  const auto ends_there = [&] {
+    return tail.size() - at >= kEndBytes && little(tail, at + 20, 2) == tail.size() - at - kEndBytes;
+  };
+  while (at != std::string::npos && !ends_there()) at = at == 0 ? std::string::npos : tail.rfind(kEnd, at - 1);
+  if (at == std::string::npos) return std::nullopt;
   DirectoryRange range{little(tail, at + 16, 4), little(tail, at + 12, 4), little(tail, at + 10, 2)};
   const bool wide = range.offset == UINT32_MAX || range.bytes == UINT32_MAX || range.entries == UINT16_MAX;
   if (wide && at >= kLocatorBytes && std::string_view(tail).substr(at - kLocatorBytes).starts_with(kLocator64)) {
@@ -150,7 +157,6 @@ std::string read_directory(int file, std::uint64_t file_bytes, std::vector<Conta
   if (!range) return "is no ZIP file, or its end is missing";
   std::string text(static_cast<std::size_t>(range->bytes), '\0');
   if (!read_at(file, range->offset, text)) return "cannot be read";
-  entries.reserve(static_cast<std::size_t>(range->entries));
   std::string_view rest = text;
   for (std::uint64_t i = 0; i < range->entries; ++i) {
     if (rest.size() < kDirectoryHead || !rest.starts_with(kInDirectory)) return "its directory is damaged";
@@ -162,13 +168,23 @@ std::string read_directory(int file, std::uint64_t file_bytes, std::vector<Conta
     std::uint64_t packed = little(rest, 20, 4);
     if (!widen(rest.substr(kDirectoryHead + name, extra), std::array{&entry.bytes, &packed, &entry.header}))
       return "its directory is damaged";
+    const std::size_t next = kDirectoryHead + name + extra + comment;
+    if (entry.name.ends_with('/')) {  // a folder of another program
+      rest.remove_prefix(next);
+      continue;
+    }
     if (little(rest, 10, 2) != 0 || packed != entry.bytes)
       return fmt::format("{} is compressed; unpack the file and name the folder", entry.name);
     if (entry.header > range->offset || entry.bytes > range->offset - entry.header) return "its directory is damaged";
     entries.push_back(std::move(entry));
-    rest.remove_prefix(kDirectoryHead + name + extra + comment);
+    rest.remove_prefix(next);
   }
   std::ranges::sort(entries, {}, &ContainerEntry::header);
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const std::uint64_t limit = i + 1 < entries.size() ? entries[i + 1].header : range->offset, from = entries[i].header;
+    if (limit - from < kEntryHead + entries[i].name.size() + entries[i].bytes)
+      return entries[i].name + " overlaps another entry";
+  }
   end = range->offset;
   return {};
 }
@@ -192,8 +208,9 @@ struct Index {
   }
   /// manifest.json, or manifest-2-of-5.json
   bool has_manifest() const {
-    const auto at = std::ranges::lower_bound(entries, kManifest, {}, &ContainerEntry::name);
-    return at != entries.end() && at->name.starts_with(kManifest);
+    const auto at = std::ranges::lower_bound(entries, kOfShard, {}, &ContainerEntry::name);
+    const bool shard = at != entries.end() && at->name.starts_with(kOfShard) && at->name.ends_with(".json");
+    return shard || find(kManifest) != nullptr;
   }
   const ContainerEntry* find(std::string_view name) const {
     const auto at = std::ranges::lower_bound(entries, name, {}, &ContainerEntry::name);
@@ -221,6 +238,8 @@ class Indexes {
     std::uint64_t end = 0;
     made->fault = read_index(file, path, static_cast<std::uint64_t>(now.st_size), made->entries, end);
     std::ranges::sort(made->entries, {}, &ContainerEntry::name);
+    const auto twice = std::ranges::adjacent_find(made->entries, {}, &ContainerEntry::name);
+    if (twice != made->entries.end() && made->fault.empty()) made->fault = twice->name + " occurs twice";
     std::erase_if(recent_, [&](const auto& one) { return one.first == path; });
     if (recent_.size() >= kRecent) recent_.erase(recent_.begin());
     recent_.emplace_back(path, made);
@@ -269,9 +288,15 @@ Through open_container(const std::string& outer, std::string inside) {
   return {std::move(file), std::move(index), std::move(inside)};
 }
 
+/// Whether an entry is a file of a job, so that other commands read no parts out of any ZIP file.
+bool is_of_job(std::string_view inside) {
+  return inside.starts_with("layers/") || inside.starts_with("program/") || inside == "inspection.json" ||
+         (inside.starts_with("manifest") && inside.ends_with(".json"));
+}
+
 Through open_through(const std::string& path) {
   auto [outer, inside] = split(path);
-  return open_container(outer, std::move(inside));
+  return is_of_job(inside) ? open_container(outer, std::move(inside)) : Through();
 }
 
 }  // namespace
@@ -286,6 +311,7 @@ Result<std::vector<ContainerEntry>> read_entries(const std::string& path, std::u
   std::uint64_t last = 0;
   const std::string fault = read_index(file.get(), path, static_cast<std::uint64_t>(status.st_size), entries, last);
   if (!fault.empty()) return wrong(fault);
+  if (const std::string& name = index_of(path, file.get(), status)->fault; !name.empty()) return wrong(name);
   if (end != nullptr) *end = last;
   return entries;
 }
@@ -304,29 +330,52 @@ bool is_job_folder(const std::string& path) {
 }
 
 OpenedEntry open_entry(const std::string& path) {
-  const Through through = open_through(path);
-  if (through.index && !through.index->fault.empty()) return {-1, through.index->fault};
+  Through through = open_through(path);
+  if (through.index && !through.index->fault.empty()) return {-1, 0, 0, through.index->fault};
   const ContainerEntry* entry = through.index ? through.index->find(through.inside) : nullptr;
   if (entry == nullptr) {
     errno = ENOENT;
     return {};
   }
   const auto head = read_head(through.file.get(), entry->header, static_cast<std::uint64_t>(through.index->stamp.st_size));
-  if (!head || !head->stored || head->entry.name != entry->name || head->entry.bytes != entry->bytes)
-    return {-1, "is damaged in its container"};
+  if (!head || !head->stored || head->entry.name != entry->name || head->entry.bytes != entry->bytes ||
+      head->entry.crc != entry->crc)
+    return {-1, 0, 0, "is damaged in its container"};
+  return {through.file.release(), head->data, entry->bytes, {}};
+}
+
+int copy_range(int file, std::uint64_t offset, std::uint64_t bytes) {
+  if (bytes > kMaxCopied) {
+    errno = EFBIG;
+    return -1;
+  }
   Descriptor copy(::memfd_create("entry", MFD_CLOEXEC));
-  if (copy.get() < 0) return {};
-  auto from = static_cast<off_t>(head->data);
-  for (std::uint64_t left = entry->bytes; left > 0;) {
-    const auto piece = static_cast<std::size_t>(std::min<std::uint64_t>(left, 1 << 30));
-    const ssize_t sent = ::sendfile(copy.get(), through.file.get(), &from, piece);
+  auto from = static_cast<off_t>(offset);
+  for (std::uint64_t left = bytes; copy.get() >= 0 && left > 0;) {
+    const ssize_t sent = ::sendfile(copy.get(), file, &from, static_cast<std::size_t>(left));
     if (sent < 0 && errno == EINTR) continue;
-    if (sent < 0) return {-1, std::strerror(errno)};
-    if (sent == 0) return {-1, "is cut off in its container"};
+    if (sent == 0) errno = EIO;  // the container was cut
+    if (sent <= 0) return -1;
     left -= static_cast<std::uint64_t>(sent);
   }
-  ::lseek(copy.get(), 0, SEEK_SET);
-  return {copy.release(), {}};
+  if (copy.get() >= 0) ::lseek(copy.get(), 0, SEEK_SET);
+  return copy.release();
+}
+
+bool has_its_sum(const std::string& container, const ContainerEntry& entry) {
+  const Descriptor file(::open(container.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct stat status {};
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return false;
+  const auto head = read_head(file.get(), entry.header, static_cast<std::uint64_t>(status.st_size));
+  if (!head || !head->stored || head->entry.name != entry.name || head->entry.bytes != entry.bytes) return false;
+  std::vector<char> piece(static_cast<std::size_t>(std::min<std::uint64_t>(entry.bytes, 256 << 10)));
+  uLong sum = 0;
+  for (std::uint64_t at = 0; at < entry.bytes; at += piece.size()) {
+    const auto part = std::span(piece).first(static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), entry.bytes - at)));
+    if (!read_at(file.get(), head->data + at, part)) return false;
+    sum = crc32_z(sum, reinterpret_cast<const Bytef*>(part.data()), part.size());
+  }
+  return sum == entry.crc && head->entry.crc == entry.crc;
 }
 
 std::optional<std::uint64_t> entry_bytes(const std::string& path) {
@@ -343,7 +392,8 @@ std::vector<std::string> names_in_folder(const std::string& folder) {
       names.push_back(at->path().filename().string());
     return names;
   }
-  const Through through = fs::is_regular_file(folder, error) ? open_container(folder, {}) : open_through(folder);
+  auto [outer, inside] = fs::is_regular_file(folder, error) ? std::pair(folder, std::string()) : split(folder);
+  const Through through = open_container(outer, std::move(inside));
   if (!through.index) return names;
   const std::string below = through.inside.empty() ? std::string() : through.inside + "/";
   for (const ContainerEntry& entry : through.index->entries) {

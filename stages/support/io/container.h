@@ -20,9 +20,9 @@ struct ContainerEntry {
   std::uint64_t bytes = 0, header = 0;  // header: its offset in the file
 };
 
-/// The entries of a container, in the order of the file; of NAME.part those that are whole, from the first on.
+/// The files of a container, in its order, without folders; of NAME.part those that are whole, from the first on.
 /// end     unless null: the offset behind the last whole entry
-/// errors  kVerification: cannot be read, no ZIP file, damaged, entries that are compressed
+/// errors  kVerification: cannot be read, no ZIP file, damaged, entries that are compressed, overlap or have the same name
 /// cost    a few reads of the directory; of NAME.part two for each entry
 Result<std::vector<ContainerEntry>> read_entries(const std::string& path, std::uint64_t* end = nullptr);
 
@@ -32,14 +32,21 @@ bool is_container(const std::string& path);
 /// Whether a directory or a container is there.
 bool is_job_folder(const std::string& path);
 
-/// A descriptor of the bytes of an entry alone.
+/// The bytes of an entry in its container.
 struct OpenedEntry {
-  int file = -1;      // owned by the caller; -1: none
+  int file = -1;  // of the container, owned by the caller; -1: none
+  std::uint64_t offset = 0, bytes = 0;
   std::string fault;  // of the container; "": errno states why there is no descriptor, ENOENT for no such entry
 };
-/// The container is read again once its file has changed.
-/// cost  copies the entry into memory
+/// Opens manifests, inspection.json, and what is in layers/ or program/; other entries are no files of a job.
+/// cost  the entries are read again only once the container has changed
 OpenedEntry open_entry(const std::string& path);
+
+/// A descriptor of a copy of a range in memory, at most 1 GiB, for libraries that read whole files; -1 with errno.
+int copy_range(int file, std::uint64_t offset, std::uint64_t bytes);
+
+/// Whether the CRC-32 of the bytes is that of the entry, as unpackers check it. cost  reads the entry
+bool has_its_sum(const std::string& container, const ContainerEntry& entry);
 
 /// Whether a path leads through a container to an entry; its size. cost  some system calls
 std::optional<std::uint64_t> entry_bytes(const std::string& path);

@@ -58,6 +58,9 @@ struct FileReader::State {
   std::string path;
   ReadRules rules;
   int file = -1;
+  bool entry = false;  // of a container: [base, base + size) of the file
+  std::uint64_t base = 0;
+  int copy = -1;        // of an entry, once its descriptor is wanted
   bool own = true;      // the descriptor is closed in the end
   bool stream = false;  // may wait for bytes
   std::uint64_t size = 0;
@@ -69,6 +72,14 @@ struct FileReader::State {
 
   ~State() {
     if (file >= 0 && own) ::close(file);
+    if (copy >= 0) ::close(copy);
+  }
+  /// As ::read().
+  ssize_t get(std::span<char> to) const {
+    if (!entry) return ::read(file, to.data(), to.size());
+    const std::uint64_t left = size - std::min(size, taken);
+    return ::pread(file, to.data(), static_cast<std::size_t>(std::min<std::uint64_t>(left, to.size())),
+                   static_cast<off_t>(base + taken));
   }
   Error error(const std::string& what) const { return {rules.fault, fmt::format("{}: {}", path, what)}; }
   bool stop(const std::string& what) {
@@ -91,7 +102,7 @@ struct FileReader::State {
     }
     ssize_t got = 0;
     do {
-      got = ::read(file, buffer.data() + end, maximum);
+      got = get(std::span(buffer).subspan(end, maximum));
     } while (got < 0 && errno == EINTR);
     if (got < 0) {
       status = error(fmt::format("cannot be read: {}", std::strerror(errno)));
@@ -130,9 +141,12 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
     state->file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
   }
   if (state->file < 0 && errno == ENOTDIR) {
-    OpenedEntry entry = open_entry(path);
-    if (!entry.fault.empty()) return state->error(entry.fault);
-    state->file = entry.file;
+    const OpenedEntry found = open_entry(path);
+    if (!found.fault.empty()) return state->error(found.fault);
+    state->file = found.file;
+    state->entry = found.file >= 0;
+    state->base = found.offset;
+    state->size = found.bytes;
   }
   struct stat status {};
   if (state->file < 0 || ::fstat(state->file, &status) != 0) {
@@ -140,6 +154,7 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
     const bool absent = errno == ENOENT || errno == ENOTDIR;
     return state->error(absent ? std::string(rules.missing) : fmt::format("cannot be opened: {}", std::strerror(errno)));
   }
+  if (state->entry) status.st_size = static_cast<off_t>(state->size);
   if (const std::string fault = fault_of_kind(status, stream, rules); !fault.empty()) return state->error(fault);
   if (stream && state->own) ::fcntl(state->file, F_SETFL, ::fcntl(state->file, F_GETFL) & ~O_NONBLOCK);
   state->stream = !S_ISREG(status.st_mode);
@@ -149,7 +164,12 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
 
 const std::string& FileReader::path() const { return state_->path; }
 std::uint64_t FileReader::size() const { return state_->size; }
-int FileReader::descriptor() const { return state_->file; }
+int FileReader::descriptor() const {
+  State& state = *state_;
+  if (!state.entry) return state.file;
+  if (state.copy < 0) state.copy = copy_range(state.file, state.base, state.size);
+  return state.copy;
+}
 const Status& FileReader::status() const { return state_->status; }
 std::uint64_t FileReader::line_number() const { return state_->line; }
 std::uint64_t FileReader::offset() const { return state_->offset; }
@@ -211,10 +231,23 @@ void FileReader::go_to(std::uint64_t offset, std::uint64_t lines) {
   state.line = lines;
   state.status = {};
   state.begin = state.end = 0;
-  state.at_end = ::lseek(state.file, static_cast<off_t>(offset), SEEK_SET) < 0;
+  state.at_end = !state.entry && ::lseek(state.file, static_cast<off_t>(offset), SEEK_SET) < 0;
+}
+
+Result<std::size_t> FileReader::read(std::span<char> to) {
+  State& state = *state_;
+  ssize_t got = 0;
+  do {
+    got = state.get(to);
+  } while (got < 0 && errno == EINTR);
+  if (got < 0) return state.error(std::strerror(errno));
+  state.taken += static_cast<std::uint64_t>(got);
+  return static_cast<std::size_t>(got);
 }
 
 bool FileReader::read_at(std::uint64_t offset, std::span<char> to) const {
+  if (state_->entry && (offset > state_->size || to.size() > state_->size - offset)) return false;
+  offset += state_->base;
   while (!to.empty()) {
     const ssize_t got = ::pread(state_->file, to.data(), to.size(), static_cast<off_t>(offset));
     if (got < 0 && errno == EINTR) continue;

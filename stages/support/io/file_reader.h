@@ -43,7 +43,7 @@ class FileReader {
 
   const std::string& path() const;
   std::uint64_t size() const;  // bytes; 0 of a stream
-  int descriptor() const;      // at the file's start until text() or next() is called
+  int descriptor() const;      // at the file's start until text(), next() or read() is called; of an entry, that of a copy
 
   /// All that has not been read. errors  rules.fault: cannot be read, or longer than the rules allow
   Result<std::string> text();
@@ -60,6 +60,9 @@ class FileReader {
   bool ended_by_cr() const;           // which was CR alone
   /// Continues reading there, after `lines` lines. Not of a stream.
   void go_to(std::uint64_t offset, std::uint64_t lines);
+
+  /// The next bytes, as of ::read(); 0 at the end. Not together with next(). errors  rules.fault
+  Result<std::size_t> read(std::span<char> to);
 
   /// Fills all of `to` from that place; false if the file is shorter. Not of a stream; leaves next() alone.
   bool read_at(std::uint64_t offset, std::span<char> to) const;
