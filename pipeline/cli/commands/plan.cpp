@@ -108,6 +108,14 @@ Result<CachedRun> run_or_take(JobCache* cache, Resolved resolved, const Progress
   return summary ? CachedRun{std::move(*summary), {}} : Result<CachedRun>(summary.error());
 }
 
+/// The output, of a container with links followed: they lead to the file that grows, and to its record.
+std::string followed_output(const Job& job) {
+  std::string output = output_of(job.output, job.container);
+  if (job.container == Container::kNone) return output;
+  const auto target = find_target(output);
+  return target && !target->file.empty() ? target->file : output;
+}
+
 Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& context) {
   Result<Job> job = read_job_options(row.keys, arguments);
   if (!job) return job.error();
@@ -119,10 +127,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->json = arguments.has("--json");
   job->quiet = arguments.has("--quiet");
   job->leave_to_machine = true;
-  job->output = output_of(std::move(job->output), job->container);
-  if (job->container != Container::kNone) {  // a link leads to the file that grows, and to its record
-    if (const auto target = find_target(job->output); target && !target->file.empty()) job->output = target->file;
-  }
+  job->output = followed_output(*job);
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
