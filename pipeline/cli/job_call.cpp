@@ -26,8 +26,9 @@ namespace {
 /// Collects a command's results and its first error; discards its messages.
 class CallContext : public Context {
  public:
-  CallContext(JobCache* cache, const ProgressCallback& progress, const std::atomic<bool>& cancel)
-      : cache_(cache), progress_(progress), cancel_(cancel) {}
+  CallContext(JobCache* cache, std::shared_ptr<load::PartStore> loaded, const ProgressCallback& progress,
+              const std::atomic<bool>& cancel)
+      : cache_(cache), loaded_(std::move(loaded)), progress_(progress), cancel_(cancel) {}
   void say_text(std::string_view) override {}
   int complain(const Error& error) override {
     if (reason.empty()) reason = one_line(error.message);
@@ -44,6 +45,7 @@ class CallContext : public Context {
   void progress(const ProgressEvent& event) override { progress_(event); }
   const std::atomic<bool>& cancel() override { return cancel_; }
   JobCache* cache() override { return cache_; }
+  std::shared_ptr<load::PartStore> loaded() override { return loaded_; }
 
   /// The single value, an array of several, or the printed text.
   Json value() const {
@@ -55,6 +57,7 @@ class CallContext : public Context {
 
  private:
   JobCache* const cache_;
+  const std::shared_ptr<load::PartStore> loaded_;
   const ProgressCallback& progress_;
   const std::atomic<bool>& cancel_;
   std::vector<Json> values_;
@@ -84,9 +87,7 @@ Arguments with_settings(Arguments arguments, const CommandSpec& spec, const Call
   return arguments;
 }
 
-BatchResult run_call(const Command& command, const Arguments& arguments, JobCache* cache, const ProgressCallback& progress,
-                     const std::atomic<bool>& cancel) {
-  CallContext context(cache, progress, cancel);
+BatchResult run_call(const Command& command, const Arguments& arguments, CallContext& context) {
   const Outcome outcome = run(command, arguments, context);
   BatchResult result;
   result.code = outcome.error ? context.complain(*outcome.error) : outcome.code;
@@ -244,11 +245,13 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   return call;
 }
 
-RunJob job_runner(const std::string& sync, std::shared_ptr<JobCache> cache) {
-  return [sync, cache = std::move(cache)](const BatchJob& job, const CallSettings& settings, const ProgressCallback& progress,
-                                          const std::atomic<bool>& cancel) {
+RunJob job_runner(const std::string& sync, std::shared_ptr<load::PartStore> loaded, std::shared_ptr<JobCache> cache) {
+  return [sync, loaded = std::move(loaded), cache = std::move(cache)](const BatchJob& job, const CallSettings& settings,
+                                                                      const ProgressCallback& progress,
+                                                                      const std::atomic<bool>& cancel) {
     const CommandLine line = unpacked(job);
-    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), cache.get(), progress, cancel);
+    CallContext context(cache.get(), loaded, progress, cancel);
+    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), context);
   };
 }
 

@@ -118,6 +118,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->json = arguments.has("--json");
   job->quiet = arguments.has("--quiet");
   job->leave_to_machine = true;
+  job->loaded = context.loaded();
   job->output = output_of(std::move(job->output), job->container);
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
