@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <utility>
 
@@ -124,7 +125,10 @@ Result<CommandLine> read_command_line(const std::vector<std::string>& words) {
   if (command == &batch_command || command == &watch_command || command->reads_itself)
     return usage("'{}' cannot be a job of a batch; run it by itself", name);
   const CommandSpec& spec = spec_for(*command);
-  Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
+  thread_local std::map<const Command*, std::unique_ptr<ArgumentReader>> readers;
+  std::unique_ptr<ArgumentReader>& reader = readers[command];
+  if (!reader) reader = std::make_unique<ArgumentReader>(spec);
+  Result<Arguments> read = reader->read({words.begin() + 1, words.end()});
   if (!read) return read.error();
   if (read->help) return usage("--help is no job");
   return CommandLine{command, spec, std::move(*read)};

@@ -123,8 +123,8 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
-  for (const std::string& note : notes_on_needs(row.product, arguments, *job)) {
-    if (!job->quiet) context.say("note: " + note);
+  if (!job->quiet) {
+    for (const std::string& note : notes_on_needs(row.product, arguments, *job)) context.say("note: " + note);
   }
   if (arguments.has("--nest")) {
     if (Status status = nest_job(row.product, *job); !status) return status;
