@@ -40,14 +40,14 @@ class PartStore {
            std::uint64_t bytes);
 
  private:
-  struct Entry {
+  struct Stored {
     std::string key;
     FileStamp stamp;
     std::shared_ptr<const void> value;
     std::uint64_t bytes;
     bool reused;
   };
-  using Entries = std::list<Entry>;
+  using Entries = std::list<Stored>;
 
   std::shared_ptr<const void> find_value(const std::string& key, const FileStamp& stamp);
   void remove(Entries::iterator entry);
