@@ -110,6 +110,25 @@ const CommandSpec& spec_for(const Command& command) {
   return found->second;
 }
 
+/// As read_arguments(), by a reader that no other thread uses now; it is kept for the next call.
+Result<Arguments> read_by_idle_reader(const Command& command, const std::vector<std::string>& words) {
+  static std::mutex mutex;
+  static std::map<const Command*, std::vector<std::unique_ptr<ArgumentReader>>> idle;
+  std::unique_ptr<ArgumentReader> reader;
+  {
+    const std::lock_guard lock(mutex);
+    if (auto& readers = idle[&command]; !readers.empty()) {
+      reader = std::move(readers.back());
+      readers.pop_back();
+    }
+  }
+  if (!reader) reader = std::make_unique<ArgumentReader>(spec_for(command));
+  Result<Arguments> read = reader->read(words);
+  const std::lock_guard lock(mutex);
+  idle[&command].push_back(std::move(reader));
+  return read;
+}
+
 /// A command line of a batch.
 struct CommandLine {
   const Command* command;
@@ -125,10 +144,7 @@ Result<CommandLine> read_command_line(const std::vector<std::string>& words) {
   if (command == &batch_command || command == &watch_command || command->reads_itself)
     return usage("'{}' cannot be a job of a batch; run it by itself", name);
   const CommandSpec& spec = spec_for(*command);
-  thread_local std::map<const Command*, std::unique_ptr<ArgumentReader>> readers;
-  std::unique_ptr<ArgumentReader>& reader = readers[command];
-  if (!reader) reader = std::make_unique<ArgumentReader>(spec);
-  Result<Arguments> read = reader->read({words.begin() + 1, words.end()});
+  Result<Arguments> read = read_by_idle_reader(*command, {words.begin() + 1, words.end()});
   if (!read) return read.error();
   if (read->help) return usage("--help is no job");
   return CommandLine{command, spec, std::move(*read)};
