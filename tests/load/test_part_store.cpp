@@ -65,7 +65,9 @@ TEST(PartStores, PartsAreThoseThatEachJobWouldReadWithAnyOptions) {
         const auto shared = load::load(path, sharing(store, options)), own = load::load(path, options);
         ASSERT_EQ(shared.ok(), own.ok()) << repetition;
         if (own) expect_equal(*shared, *own);
-        if (!own) EXPECT_EQ(shared.error().message, own.error().message);
+        if (!own) {
+          EXPECT_EQ(shared.error().message, own.error().message);
+        }
       }
     }
   }
@@ -74,9 +76,7 @@ TEST(PartStores, PartsAreThoseThatEachJobWouldReadWithAnyOptions) {
 
 TEST(PartStores, ChangedFilesAreReadAgain) {
   const auto store = std::make_shared<PartStore>(1u << 30);
-  const auto cube = [](float size) {
-    return test::gzip(test::binary_stl(test::box_facets({0, 0, 0}, {size, size, size})));
-  };
+  const auto cube = [](float size) { return test::gzip(test::binary_stl(test::box_facets({0, 0, 0}, {size, size, size}))); };
   const std::string path = test::write_file("changing.stl.gz", cube(10));
   test::loaded(path, sharing(store));
   EXPECT_EQ(store->bytes(), 0u) << "the file may change within a step of its clock";
