@@ -14,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "stages/load/part_store.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/sync.h"
 #include "stages/support/text/readable.h"
@@ -26,7 +27,7 @@ using std::chrono::milliseconds;
 constexpr std::chrono::seconds kGrace{20};            // for a job to stop at its time limit
 constexpr std::chrono::milliseconds kLastGrace{600};  // with the batch: a signal is heard within a second
 constexpr std::chrono::nanoseconds kTrimInterval{50'000'000};
-constexpr Fault kOverdue = Fault::kInput;             // its part cannot be planned within the time limit
+constexpr Fault kOverdue = Fault::kInput;  // its part cannot be planned within the time limit
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -64,7 +65,9 @@ class Queue : public std::enable_shared_from_this<Queue> {
         stop_all();
       }
       check_clocks();
-      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && running_ == 0 && (unsynced_ == 0 || is_sync_overdue()))) break;
+      if (const auto ended = report(watcher, lock);
+          ended == jobs_.size() || (stopped_ && running_ == 0 && (unsynced_ == 0 || is_sync_overdue())))
+        break;
       changed_.wait_for(lock, milliseconds(100));
     }
     report(watcher, lock);
@@ -205,7 +208,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
       const std::shared_ptr<Slot> slot = slots_[i] = std::make_shared<Slot>();
       slot->begun = Clock::now();
       ++running_;
-      need_ += job.need_bytes;
+      take_memory(job.need_bytes);
       summary_.max_running = std::max(summary_.max_running, running_);
       summary_.max_need_bytes = std::max(summary_.max_need_bytes, need_);
       lock.unlock();
@@ -220,6 +223,12 @@ class Queue : public std::enable_shared_from_this<Queue> {
     changed_.notify_all();
   }
 
+  /// Requires the lock. Shared parts get what running jobs do not need. bytes  a job's need; negated at its end, modulo 2^64
+  void take_memory(std::uint64_t bytes) {
+    need_ += bytes;
+    if (options_.loaded) options_.loaded->limit(loaded_share(options_.memory_bytes, need_));
+  }
+
   /// Returns freed memory to the system; between small jobs only now and then, for they free little.
   void trim() {
     const std::int64_t now = Clock::now().time_since_epoch().count();
@@ -232,7 +241,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
   void end(std::size_t i, BatchResult result) {
     slots_.erase(i);
     --running_;
-    need_ -= jobs_[i].need_bytes;
+    take_memory(0 - jobs_[i].need_bytes);
     if (result.outcome == BatchOutcome::kDone && result.unsynced) {
       ++unsynced_;
       group_.emplace_back(i, std::move(result));
@@ -351,6 +360,10 @@ class Queue : public std::enable_shared_from_this<Queue> {
 };
 
 }  // namespace
+
+std::uint64_t loaded_share(std::uint64_t memory_bytes, std::uint64_t need_bytes) {
+  return std::min(memory_bytes / 4, memory_bytes - std::min(memory_bytes, need_bytes));
+}
 
 std::uint64_t layer_share(std::uint64_t memory_bytes, std::uint32_t jobs) {
   constexpr std::uint64_t kMin = 32ull << 20;

@@ -1,14 +1,13 @@
 // pipeline/cache/input_digests.h: hashes of input files, each taken once as long as the file does not change.
 #pragma once
 
-#include <cstdint>
-#include <ctime>
 #include <map>
 #include <mutex>
 #include <string>
 
 #include "stages/data/status.h"
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 
@@ -21,9 +20,7 @@ class InputDigests {
 
  private:
   struct Known {
-    std::uint64_t device = 0, inode = 0;
-    timespec modified{}, changed{};
-    bool settled = false;  // the file was older than the resolution of its times when it was hashed
+    FileStamp stamp;  // before it was hashed
     FileDigest digest;
   };
   std::mutex mutex_;

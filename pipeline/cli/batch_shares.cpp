@@ -63,7 +63,7 @@ double estimate_seconds(const Json& summary) try {
 /// Costs in microseconds by dry runs.
 class DryRuns {
  public:
-  explicit DryRuns(const std::atomic<bool>& cancel) : run_(job_runner("")), cancel_(cancel) {}
+  explicit DryRuns(const std::atomic<bool>& cancel) : run_(job_runner("", {})), cancel_(cancel) {}
 
   /// files  cost from the files
   std::uint64_t cost_of(const BatchJob& job, const CostedJob& files) {

@@ -15,6 +15,10 @@
 #include "stages/support/hash/hash.h"
 #include "stages/support/text/json_value.h"
 
+namespace lamina::load {
+class PartStore;
+}
+
 namespace lamina::pipeline {
 
 class JobCache;  // pipeline/cache/store.h
@@ -40,6 +44,8 @@ class Context {
 
   /// A cache that the caller gives its jobs; nullptr for none.
   virtual JobCache* cache() { return nullptr; }
+  /// Loaded parts of the caller's other jobs; null for none.
+  virtual std::shared_ptr<load::PartStore> loaded() { return {}; }
 
   /// How people know a file, where a call works on files that it made itself.
   virtual std::string shown(const std::string& path) { return path; }
@@ -133,8 +139,9 @@ Outcome run_lamina(const std::vector<std::string>& words, Console& console);
 Outcome run_command(const Command& command, const std::vector<std::string>& words, Console& console);
 
 // --- one file each in commands/, except plan.cpp (all commands that plan a job) and manual.cpp (also completion)
-extern const Command jet_command, slice_command, heights_command, extrude_command, info_command, export_command, verify_command, nest_command,
-    calibrate_command, permeability_command, design_command, merge_command, stream_command, convert_command, compare_command,
-    machines_command, preview_command, report_command, batch_command, watch_command, cache_command, completion_command, manual_command;
+extern const Command jet_command, slice_command, heights_command, extrude_command, info_command, export_command, verify_command,
+    nest_command, calibrate_command, permeability_command, design_command, merge_command, stream_command, convert_command,
+    compare_command, machines_command, preview_command, report_command, batch_command, watch_command, cache_command,
+    completion_command, manual_command;
 
 }  // namespace lamina::pipeline

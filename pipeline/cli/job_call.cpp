@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <utility>
 
@@ -26,8 +27,9 @@ namespace {
 /// Collects a command's results and its first error; discards its messages.
 class CallContext : public Context {
  public:
-  CallContext(JobCache* cache, const ProgressCallback& progress, const std::atomic<bool>& cancel)
-      : cache_(cache), progress_(progress), cancel_(cancel) {}
+  CallContext(JobCache* cache, std::shared_ptr<load::PartStore> loaded, const ProgressCallback& progress,
+              const std::atomic<bool>& cancel)
+      : cache_(cache), loaded_(std::move(loaded)), progress_(progress), cancel_(cancel) {}
   void say_text(std::string_view) override {}
   int complain(const Error& error) override {
     if (reason.empty()) reason = one_line(error.message);
@@ -44,6 +46,7 @@ class CallContext : public Context {
   void progress(const ProgressEvent& event) override { progress_(event); }
   const std::atomic<bool>& cancel() override { return cancel_; }
   JobCache* cache() override { return cache_; }
+  std::shared_ptr<load::PartStore> loaded() override { return loaded_; }
 
   /// The single value, an array of several, or the printed text.
   Json value() const {
@@ -55,6 +58,7 @@ class CallContext : public Context {
 
  private:
   JobCache* const cache_;
+  const std::shared_ptr<load::PartStore> loaded_;
   const ProgressCallback& progress_;
   const std::atomic<bool>& cancel_;
   std::vector<Json> values_;
@@ -84,9 +88,7 @@ Arguments with_settings(Arguments arguments, const CommandSpec& spec, const Call
   return arguments;
 }
 
-BatchResult run_call(const Command& command, const Arguments& arguments, JobCache* cache, const ProgressCallback& progress,
-                     const std::atomic<bool>& cancel) {
-  CallContext context(cache, progress, cancel);
+BatchResult run_call(const Command& command, const Arguments& arguments, CallContext& context) {
   const Outcome outcome = run(command, arguments, context);
   BatchResult result;
   result.code = outcome.error ? context.complain(*outcome.error) : outcome.code;
@@ -108,6 +110,25 @@ const CommandSpec& spec_for(const Command& command) {
   return found->second;
 }
 
+/// As read_arguments(), by a reader that no other thread uses now; it is kept for the next call.
+Result<Arguments> read_by_idle_reader(const Command& command, const std::vector<std::string>& words) {
+  static std::mutex mutex;
+  static std::map<const Command*, std::vector<std::unique_ptr<ArgumentReader>>> idle;
+  std::unique_ptr<ArgumentReader> reader;
+  {
+    const std::lock_guard lock(mutex);
+    if (auto& readers = idle[&command]; !readers.empty()) {
+      reader = std::move(readers.back());
+      readers.pop_back();
+    }
+  }
+  if (!reader) reader = std::make_unique<ArgumentReader>(spec_for(command));
+  Result<Arguments> read = reader->read(words);
+  const std::lock_guard lock(mutex);
+  idle[&command].push_back(std::move(reader));
+  return read;
+}
+
 /// A command line of a batch.
 struct CommandLine {
   const Command* command;
@@ -123,7 +144,7 @@ Result<CommandLine> read_command_line(const std::vector<std::string>& words) {
   if (command == &batch_command || command == &watch_command || command->reads_itself)
     return usage("'{}' cannot be a job of a batch; run it by itself", name);
   const CommandSpec& spec = spec_for(*command);
-  Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
+  Result<Arguments> read = read_by_idle_reader(*command, {words.begin() + 1, words.end()});
   if (!read) return read.error();
   if (read->help) return usage("--help is no job");
   return CommandLine{command, spec, std::move(*read)};
@@ -244,11 +265,13 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   return call;
 }
 
-RunJob job_runner(const std::string& sync, std::shared_ptr<JobCache> cache) {
-  return [sync, cache = std::move(cache)](const BatchJob& job, const CallSettings& settings, const ProgressCallback& progress,
-                                          const std::atomic<bool>& cancel) {
+RunJob job_runner(const std::string& sync, std::shared_ptr<load::PartStore> loaded, std::shared_ptr<JobCache> cache) {
+  return [sync, loaded = std::move(loaded), cache = std::move(cache)](const BatchJob& job, const CallSettings& settings,
+                                                                      const ProgressCallback& progress,
+                                                                      const std::atomic<bool>& cancel) {
     const CommandLine line = unpacked(job);
-    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), cache.get(), progress, cancel);
+    CallContext context(cache.get(), loaded, progress, cancel);
+    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), context);
   };
 }
 

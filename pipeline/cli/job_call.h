@@ -9,6 +9,10 @@
 #include "pipeline/cli/terminal/arguments.h"
 #include "stages/data/status.h"
 
+namespace lamina::load {
+class PartStore;
+}
+
 namespace lamina::pipeline {
 
 class Context;   // pipeline/cli/command.h
@@ -29,6 +33,7 @@ Result<Call> read_call(const std::vector<std::string>& words);
 /// messages are discarded.
 /// sync   when files are flushed to disk, for jobs without a setting of their own; "" for none
 /// cache  for jobs without --cache; none: no cache
-RunJob job_runner(const std::string& sync, std::shared_ptr<JobCache> cache = {});
+/// loaded  parts that jobs share; none: each job reads its files
+RunJob job_runner(const std::string& sync, std::shared_ptr<load::PartStore> loaded, std::shared_ptr<JobCache> cache = {});
 
 }  // namespace lamina::pipeline

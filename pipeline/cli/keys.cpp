@@ -37,9 +37,14 @@ std::string_view heading_of(const KeyName& key) {
 }
 
 bool has(std::string_view choice, const KeyName& key) {
-  const auto names = split(choice, " ");
-  const std::string whole = fmt::format("{}.{}", key.section, key.name);
-  return std::ranges::any_of(names, [&](std::string_view name) { return name == key.section || name == whole; });
+  for (std::size_t begin = 0, end = 0; begin <= choice.size(); begin = end + 1) {
+    end = std::min(choice.find(' ', begin), choice.size());
+    std::string_view name = choice.substr(begin, end - begin);
+    if (!name.starts_with(key.section)) continue;
+    name.remove_prefix(key.section.size());
+    if (name.empty() || (name.front() == '.' && name.substr(1) == key.name)) return true;
+  }
+  return false;
 }
 
 template <class Target>
@@ -66,7 +71,7 @@ Status check_together(std::string_view choice, const Arguments& arguments, const
   if (job.segment.any()) return {};
   for (const JobKey& key : job_keys()) {
     if (key.section != "segment" || key.name == "fill" || key.name == "on" || key.flag.empty()) continue;
-    if (has(choice, key) && arguments.has(key.flag))
+    if (arguments.has(key.flag) && has(choice, key))
       return at_option(key.flag, "applies to segmented lines, and nothing is segmented; add --fill segmented");
   }
   return {};
@@ -253,13 +258,13 @@ Result<Job> read_job_options(std::string_view choice, const Arguments& arguments
     if (Status status = set_key(job, assignment); !status) return status.error();
   }
   for (const JobKey& key : job_keys()) {
-    if (key.flag.empty() || !has(choice, key) || !arguments.has(key.flag)) continue;
+    if (key.flag.empty() || !arguments.has(key.flag) || !has(choice, key)) continue;
     const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
     if (Status status = at_option(key.flag, with_comma_hint(key.read(text, job), text)); !status) return status.error();
     job.named.push_back(fmt::format("{}.{}", key.section, key.name));
   }
   for (const PartKey& key : part_keys()) {
-    if (key.flag.empty() || !has(choice, key) || !arguments.has(key.flag)) continue;
+    if (key.flag.empty() || !arguments.has(key.flag) || !has(choice, key)) continue;
     if (key.flag == "--at" && job.parts.size() > 1) {
       return at_option(key.flag, fmt::format("is for a single part, here are {}; set at_mm of each [[part]] in a job file",
                                              job.parts.size()))

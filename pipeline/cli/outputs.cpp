@@ -140,6 +140,7 @@ std::vector<std::string> outputs_of(const Arguments& arguments) {
 /// Two outputs of one call are two files. errors  kUsage
 Status check_apart(const Arguments& arguments) {
   std::vector<fs::path> positions;
+  if (std::ranges::count_if(kOutputs, [&](std::string_view flag) { return arguments.has(flag); }) < 2) return {};
   for (const std::string_view flag : kOutputs) {
     const std::string path = arguments.text(flag);
     if (path.empty() || is_stream(path)) continue;
@@ -249,7 +250,7 @@ Status check_outputs(const Arguments& arguments, const Job& job) {
   for (const std::string& preset : job.machine.presets) inputs.push_back({preset, "a preset"});
   if (Status status = check_quote(arguments, job.output); !status) return status;
   std::vector<std::string> outputs = outputs_of(arguments);
-  add_output(job.output, outputs);
+  if (std::ranges::find(outputs, job.output) == outputs.end()) add_output(job.output, outputs);
   return check_outputs(inputs, outputs);
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,6 +24,9 @@ enum class VatRule : std::uint8_t;  // stages/data/machine.h
 }
 namespace lamina::heights {
 struct Options;
+}
+namespace lamina::load {
+class PartStore;
 }
 
 namespace lamina::pipeline {
@@ -211,8 +215,9 @@ struct Job {
   bool quote = false;                  // report the consumption of each part, also without prices
   bool json = false;
   bool quiet = false;
-  std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"
-  bool leave_to_machine = false;   // toolpaths: unset walls and layers are the extruder's, not those here
+  std::vector<std::string> named;           // keys that a file, an option or --set gave, as in "fill.walls"
+  std::shared_ptr<load::PartStore> loaded;  // parts of the jobs of one process; none: each job reads its files
+  bool leave_to_machine = false;            // toolpaths: unset walls and layers are the extruder's, not those here
   /// Profiles that its file names and that are not there, with what to say of each.
   std::vector<std::pair<std::string, std::string>> missing;
 };

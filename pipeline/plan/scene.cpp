@@ -9,6 +9,7 @@
 #include <numeric>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
@@ -60,9 +61,11 @@ std::uint64_t fingerprint_of(const Instance& instance, const Mesh& mesh) {
   return hash;
 }
 
-// Brings a mesh's box to the origin, so that any offset on the bed fits 32 bits; returns where it was.
-Point3 rebase(Mesh& mesh) {
+// Brings a mesh's box to the origin, so that any offset on the bed fits 32 bits; returns where it was. shared  other jobs may
+// use its blocks, which stay as they are
+Point3 rebase(Mesh& mesh, bool shared) {
   const Point3 from = mesh.bounds.lo;
+  if (mesh.blocks && shared) mesh.triangles = list_of(*std::exchange(mesh.blocks, {}));
   const auto shift = [&](Point3& p) { p = {p.x - from.x, p.y - from.y, p.z - from.z}; };
   if (mesh.blocks) mesh.blocks->shift({-from.x, -from.y, -from.z});
   for (Triangle& t : mesh.triangles) {
@@ -313,6 +316,7 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request) {
   options.turn_shells = job.fill_rule == FillRule::kNonzero;
   options.winding = job.winding;
   options.weld_nm = nm_of(job.weld_um / 1000);
+  options.store = job.loaded;
   return options;
 }
 
@@ -355,7 +359,7 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, MeshForm form, const Pi
       auto base = rebased.find(mesh);
       if (base == rebased.end() && !(fits(x) && fits(y) && fits(z))) {
         base = rebased.emplace(mesh, scene.meshes[mesh].bounds.lo).first;
-        rebase(scene.meshes[mesh]);
+        rebase(scene.meshes[mesh], job.loaded != nullptr);
         // Shifts earlier instances of the mesh as well.
         for (Instance& earlier : scene.instances) {
           if (earlier.mesh != mesh) continue;

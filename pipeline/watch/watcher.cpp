@@ -24,6 +24,7 @@
 #include "pipeline/watch/folder.h"
 #include "pipeline/watch/moves.h"
 #include "pipeline/watch/planning.h"
+#include "stages/load/part_store.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -193,10 +194,16 @@ class FolderWatcher {
 
   bool fits(const WatchTask& task) const { return tasks_.empty() || need_ + task.need_bytes <= options_.memory_bytes; }
 
+  /// As in a batch.
+  void take_memory(std::uint64_t bytes) {
+    need_ += bytes;
+    if (options_.loaded) options_.loaded->limit(loaded_share(options_.memory_bytes, need_));
+  }
+
   // Threads are detached: a job that ignores its stop must not keep the watcher from ending.
   void start(std::shared_ptr<WatchTask> task) {
     task->begun = Clock::now();
-    need_ += task->need_bytes;
+    take_memory(task->need_bytes);
     tasks_.insert(task);
     std::thread([running = running_, task = std::move(task)] {
       run_task(running->shared, *task, [&] { running->report(running->planned, task->job); });
@@ -220,7 +227,7 @@ class FolderWatcher {
 
   void end(const std::shared_ptr<WatchTask>& task) {
     tasks_.erase(task);
-    need_ -= task->need_bytes;
+    take_memory(0 - task->need_bytes);
     news_ = true;  // it may have moved files
     if (task->fatal && !fatal_) fatal_ = *task->problem;
     if (task->end == End::kRetry && !task->fatal) {

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -14,6 +15,10 @@
 #include "pipeline/watch/record.h"
 #include "pipeline/watch/settings.h"
 #include "stages/data/status.h"
+
+namespace lamina::load {
+class PartStore;
+}
 
 namespace lamina::pipeline {
 
@@ -24,7 +29,8 @@ struct WatchOptions {
   double poll_seconds = 1, time_limit_seconds = 0, then_limit_seconds = 600;  // of planning, of the command; 0: none
   std::uint32_t jobs = 1;                                                     // running at a time
   std::uint64_t memory_bytes = 1ull << 30;
-  bool once = false;  // ends when nothing is left to do
+  bool once = false;                        // ends when nothing is left to do
+  std::shared_ptr<load::PartStore> loaded;  // parts that jobs share, as in a batch
 };
 
 /// What happens, for the console; called by the thread that called watch_folder().

@@ -6,8 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <memory>
+#include <optional>
+#include <utility>
 
 #include "stages/data/shortage.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/load/part_store.h"
 #include "stages/load/repair/finish.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/stl_binary.h"
@@ -290,6 +295,18 @@ Result<Format> detect(const Source& source) {
   return source.error("is neither STL, OBJ nor 3MF; export the part as one of these");
 }
 
+/// The inflated bytes of an opened file; from the store, if it has them.
+Result<Source> inflated(const Source& source, const LoadOptions& options) {
+  const std::string path(source.path()), key = fmt::format("gzip {} {}", options.expanded_limit, path);
+  const std::optional<FileStamp> stamp = options.store ? file_stamp(path) : std::nullopt;
+  if (stamp) {
+    if (auto known = options.store->find<Buffer<char>>(key, *stamp)) return Source::of_memory(path, std::move(known));
+  }
+  Result<Source> plain = inflate_gzip(source, options.expanded_limit);
+  if (plain && stamp) options.store->add(key, path, *stamp, plain->memory(), bytes_held(*plain->memory()));
+  return plain;
+}
+
 /// Opens a file and inflates it if need be.
 Result<Source> open_plain(const std::string& path, const LoadOptions& options, Format& format, bool& was_gzip) {
   Result<Source> source = Source::open(path);
@@ -298,7 +315,7 @@ Result<Source> open_plain(const std::string& path, const LoadOptions& options, F
   if (!found) return found.error();
   was_gzip = *found == Format::kGzip;
   if (was_gzip) {
-    source = inflate_gzip(*source, options.expanded_limit);
+    source = inflated(*source, options);
     if (!source) return source;
     found = detect(*source);
     if (!found) return found.error();
@@ -396,6 +413,38 @@ Result<Part> load_unguarded(const std::string& path, const LoadOptions& options,
   return part;
 }
 
+/// The file's name and all options that decide its meshes. A new option has to be listed here.
+std::string key_of(const std::string& path, const LoadOptions& options) {
+  const auto& [transform, unit_mm, drop_bad, repair, blocks, shown_only, order, isa, scratch, turn_shells, winding, weld_nm,
+               triangle_limit, expanded_limit, store] = options;
+  std::string key = fmt::format("part {} {}{}{}{}{}{}{} {} {} {}", unit_mm, drop_bad, repair, blocks, shown_only, order,
+                                turn_shells, winding, weld_nm, triangle_limit, expanded_limit);
+  for (const double value : transform.linear) key += fmt::format(" {}", value);
+  for (const double value : transform.translation) key += fmt::format(" {}", value);
+  return key + " " + path;
+}
+
+std::uint64_t bytes_of(const Part& part) {
+  std::uint64_t bytes = sizeof(Part) + part.instances.size() * sizeof(Instance);
+  for (const Mesh& mesh : part.meshes) {
+    bytes += sizeof(Mesh) + mesh.triangles.size() * sizeof(Triangle);
+    if (mesh.blocks) bytes += mesh.blocks->bytes() + mesh.blocks->bounds_bytes();
+  }
+  return bytes;
+}
+
+/// Takes a part from the store, or reads it and may add it.
+Result<Part> load_from_store(const std::string& path, const LoadOptions& options) {
+  const std::optional<FileStamp> stamp = file_stamp(path);
+  if (!stamp) return load_unguarded(path, options, {});
+  const std::string key = key_of(path, options);
+  if (const auto known = options.store->find<Part>(key, *stamp)) return *known;
+  Result<Part> part = load_unguarded(path, options, {});
+  if (part && options.store->wants(key, path))
+    options.store->add(key, path, *stamp, std::make_shared<const Part>(*part), bytes_of(*part));
+  return part;
+}
+
 /// Libraries and memory may throw; nothing leaves this stage that way.
 template <class Work>
 auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
@@ -428,7 +477,8 @@ Transform make_transform(const std::array<double, 3>& scale, const std::array<do
 }
 
 Result<Part> load(const std::string& path, const LoadOptions& options, const SeeTriangles& see) {
-  return guarded(path, [&] { return load_unguarded(path, options, see); });
+  return guarded(path,
+                 [&] { return options.store && !see ? load_from_store(path, options) : load_unguarded(path, options, see); });
 }
 
 Result<std::string> format_of(const std::string& path, const LoadOptions& options) {

@@ -36,6 +36,8 @@ inline constexpr std::int64_t kWeldByItself = 5'000;
 struct Scratch;
 std::shared_ptr<Scratch> make_scratch(Isa isa = Isa::kAuto);
 
+class PartStore;  // stages/load/part_store.h
+
 struct LoadOptions {
   Transform transform;
   double unit_mm = 1.0;              // mm per unit of files that carry none (STL, OBJ); 3MF states its own
@@ -51,6 +53,7 @@ struct LoadOptions {
   std::int64_t weld_nm = kWeldByItself;       // repair joins open edges that are at most this far apart
   std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first
   std::uint64_t expanded_limit = 8ull << 30;  // bytes a compressed file may expand to
+  std::shared_ptr<PartStore> store;           // parts and unpacked files of other jobs; none: each call reads the file
 };
 
 /// Is shown the triangles of a file in pieces, each in the order of the file, by any thread.

@@ -40,10 +40,10 @@ Result<Source> Source::open(const std::string& path) {
   return source;
 }
 
-Source Source::of_memory(std::string path, Buffer<char> bytes) {
+Source Source::of_memory(std::string path, std::shared_ptr<const Buffer<char>> bytes) {
   Source source;
   source.path_ = std::move(path);
-  source.size_ = bytes.size();
+  source.size_ = bytes->size();
   source.memory_ = std::move(bytes);
   return source;
 }
@@ -51,7 +51,7 @@ Source Source::of_memory(std::string path, Buffer<char> bytes) {
 bool Source::read(std::uint64_t offset, char* to, std::size_t count) const {
   if (offset > size_ || count > size_ - offset) return false;
   if (file_) return file_->read_at(offset, {to, count});
-  if (count > 0) std::memcpy(to, memory_.data() + offset, count);
+  if (count > 0) std::memcpy(to, memory_->data() + offset, count);
   return true;
 }
 
@@ -105,7 +105,7 @@ Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
   }
   if (within_member) return compressed.error("gzip data ends early: the file was cut short; copy it again");
   output.resize(written);
-  return Source::of_memory(std::string(compressed.path()), std::move(output));
+  return Source::of_memory(std::string(compressed.path()), std::make_shared<const Buffer<char>>(std::move(output)));
 }
 
 }  // namespace lamina::load

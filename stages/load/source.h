@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,10 +22,12 @@ class Source {
 
   /// errors  kInput: missing, not readable, not a regular file
   static Result<Source> open(const std::string& path);
-  static Source of_memory(std::string path, Buffer<char> bytes);
+  static Source of_memory(std::string path, std::shared_ptr<const Buffer<char>> bytes);
 
   std::string_view path() const { return path_; }
   std::uint64_t size() const { return size_; }
+  /// The bytes, if they are in memory.
+  const std::shared_ptr<const Buffer<char>>& memory() const { return memory_; }
 
   /// Fills all of `to`; false if the file is shorter or cannot be read.
   bool read(std::uint64_t offset, char* to, std::size_t count) const;
@@ -39,7 +42,7 @@ class Source {
  private:
   std::string path_;
   std::optional<FileReader> file_;  // else in memory
-  Buffer<char> memory_;
+  std::shared_ptr<const Buffer<char>> memory_;
   std::uint64_t size_ = 0;
 };
 

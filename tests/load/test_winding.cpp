@@ -3,6 +3,11 @@
 
 #include <oneapi/tbb/global_control.h>
 
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
 #include "stages/load/repair/diagnose.h"
 #include "tests/load/broken_files.h"
 
@@ -23,6 +28,33 @@ TEST(Winding, IsAHalfAtTheMiddleOfAHalvedBall) {
   const Mesh mesh = mesh_of(half);
   const load::WindingTree tree({mesh.triangles.data(), mesh.triangles.size()}, {0, 0, 0});
   EXPECT_NEAR(tree.at({0, 0, 0}), 0.5, 0.02);
+}
+
+TEST(Winding, OfALeafIsTheSumOfAllSolidAngles) {
+  std::mt19937 numbers(7);
+  const auto near = [&] { return static_cast<Nm>(numbers() % 2001) * 1000 - 1'000'000; };
+  const auto point = [&] { return Point3{near(), near(), near()}; };
+  using Vector = std::array<double, 3>;
+  const auto dot = [](const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::vector<Triangle> facets(1 + numbers() % 8);
+    for (Triangle& t : facets) t = {point(), point(), point()};
+    const Point3 from = trial % 10 == 0 ? facets[0].a : point();
+    double angles = 0;
+    for (const Triangle& t : facets) {
+      std::array<Vector, 3> v{};
+      for (std::size_t i = 0; const Point3& p : {t.a, t.b, t.c})
+        v[i++] = {static_cast<double>(p.x - from.x), static_cast<double>(p.y - from.y), static_cast<double>(p.z - from.z)};
+      const auto& [a, b, c] = v;
+      const double la = std::sqrt(dot(a, a)), lb = std::sqrt(dot(b, b)), lc = std::sqrt(dot(c, c));
+      const Vector n{b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]};
+      angles += 2 * std::atan2(dot(a, n), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+    }
+    const load::WindingTree tree(facets, {0, 0, 0});
+    const double found =
+        tree.at({static_cast<double>(from.x), static_cast<double>(from.y), static_cast<double>(from.z)}) - angles / (4 * M_PI);
+    if (std::fabs(found) > 0.03) ADD_FAILURE() << trial << ": " << found << " of " << facets.size();
+  }
 }
 
 TEST(Remesh, GivesAClosedSolidOfTheSameVolumeForAnyThreads) {

@@ -21,6 +21,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
 #include "stages/load/load.h"
+#include "stages/load/part_store.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/temporary.h"
@@ -219,6 +220,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   Result<BatchOptions> read = read_options(arguments, with);
   if (!read) return read.error();
   read->sync_in_groups = arguments.text("--sync").empty() || arguments.text("--sync") == "job";
+  read->loaded = std::make_shared<load::PartStore>(loaded_share(read->memory_bytes, 0));
   const BatchOptions& options = *read;
   Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
@@ -241,7 +243,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   watcher.ended = [&](const BatchJob& job, const BatchResult& result, const BatchState& state) {
     console.ended(job, result, state);
   };
-  const RunJob runner = job_runner(arguments.text("--sync"), *cache);
+  const RunJob runner = job_runner(arguments.text("--sync"), options.loaded, *cache);
   const Result<BatchSummary> summary = run_batch(jobs, std::move(*record), options, runner, watcher, context.cancel());
   console.clear();
   if (!summary) return summary.error();

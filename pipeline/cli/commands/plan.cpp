@@ -127,12 +127,13 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->json = arguments.has("--json");
   job->quiet = arguments.has("--quiet");
   job->leave_to_machine = true;
+  job->loaded = context.loaded();
   job->output = followed_output(*job);
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
-  for (const std::string& note : notes_on_needs(row.product, arguments, *job)) {
-    if (!job->quiet) context.say("note: " + note);
+  if (!job->quiet) {
+    for (const std::string& note : notes_on_needs(row.product, arguments, *job)) context.say("note: " + note);
   }
   if (arguments.has("--nest")) {
     if (Status status = nest_job(row.product, *job); !status) return status;
@@ -145,8 +146,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (arguments.has("--job")) left = notes_on_defaults(arguments.text("--job"), resolved->job);
   }
   if (resolved->printer && resolved->printer->machine) {
-    const Status status = check_machine_needs(resolved->printer->machine->machine, arguments);
-    if (!status) return status;
+    if (Status status = check_machine_needs(resolved->printer->machine->machine, arguments); !status) return status;
   }
   std::optional<File> file;  // takes its name once the job is planned
   if (arguments.has("--save-job")) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
@@ -13,6 +14,7 @@
 #include "pipeline/watch/after_job.h"
 #include "pipeline/watch/moves.h"
 #include "pipeline/watch/watcher.h"
+#include "stages/load/part_store.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/escape.h"
 #include "stages/support/text/number_text.h"
@@ -121,8 +123,9 @@ int watch_code(const WatchSummary& summary, bool once) {
 }
 
 Outcome run_watch_command(const Arguments& arguments, Context& context) {
-  const Result<WatchOptions> options = read_watch_options(arguments);
+  Result<WatchOptions> options = read_watch_options(arguments);
   if (!options) return options.error();
+  options->loaded = std::make_shared<load::PartStore>(loaded_share(options->memory_bytes, 0));
   const bool quiet = arguments.has("--quiet"), json = arguments.has("--json");
   keep_on_signals();  // jobs that are done
   const std::atomic<bool>& interrupt = context.cancel();
@@ -147,7 +150,7 @@ Outcome run_watch_command(const Arguments& arguments, Context& context) {
       },
       [&](const Error& error) { context.complain(error); }};
   const Result<WatchSummary> summary =
-      watch_folder(*options, read_call, job_runner(arguments.text("--sync")), observer, interrupt);
+      watch_folder(*options, read_call, job_runner(arguments.text("--sync"), options->loaded), observer, interrupt);
   if (!summary) return summary.error();
   if (!quiet) context.say(fmt::format("{} done, {} failed", summary->done, summary->failed));
   int code = printed ? watch_code(*summary, options->once) : context.complain(printed.error());

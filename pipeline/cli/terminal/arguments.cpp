@@ -77,12 +77,11 @@ std::string first_examples(std::string_view end) {
 }
 
 /// Options of other slicers with the meaning and the values of one of lamina, which are accepted in its place.
-constexpr std::string_view kAcceptedAliases[][2] = {
-    {"--layer", "--layer-height"},
-    {"--density", "--infill --fill-density --infill-sparse-density"},
-    {"--walls", "--perimeters --wall-loops --wall-line-count"},
-    {"--top-layers", "--top-solid-layers"},
-    {"--bottom-layers", "--bottom-solid-layers"}};
+constexpr std::string_view kAcceptedAliases[][2] = {{"--layer", "--layer-height"},
+                                                    {"--density", "--infill --fill-density --infill-sparse-density"},
+                                                    {"--walls", "--perimeters --wall-loops --wall-line-count"},
+                                                    {"--top-layers", "--top-solid-layers"},
+                                                    {"--bottom-layers", "--bottom-solid-layers"}};
 
 /// An option of lamina, the options of other slicers that it is called there, and what differs.
 struct SlicerAlias {
@@ -127,8 +126,9 @@ constexpr SlicerAlias kSlicerAliases[] = {
 std::string with_aliases(const CommandSpec& spec, const std::string& flags) {
   std::string names = flags;
   for (const auto& [ours, theirs] : kAcceptedAliases) {
+    if (ours != flags) continue;
     for (const std::string_view name : split(theirs, " "))
-      if (ours == flags && spec.find(name) == nullptr) names += fmt::format(",{}", name);
+      if (spec.find(name) == nullptr) names += fmt::format(",{}", name);
   }
   return names;
 }
@@ -137,7 +137,11 @@ std::string with_aliases(const CommandSpec& spec, const std::string& flags) {
 
 const OptionSpec* CommandSpec::find(std::string_view flag) const {
   for (const OptionSpec& option : options) {
-    if (const auto flags = split(option.flag, ","); std::ranges::find(flags, flag) != flags.end()) return &option;
+    std::string_view flags = option.flag;
+    for (std::size_t comma = 0; (comma = flags.find(',')) != flags.npos; flags.remove_prefix(comma + 1)) {
+      if (flags.substr(0, comma) == flag) return &option;
+    }
+    if (flags == flag) return &option;
   }
   return nullptr;
 }
@@ -182,70 +186,88 @@ std::string slicer_alias(std::string_view flag, const CommandSpec& spec) {
   return {};
 }
 
-Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments) {
-  const auto wrong = [&](const std::string& what) {
-    const std::string line = one_line(what);
-    if (line.ends_with('?')) return Error{Fault::kUsage, line};
-    return usage("{}; see lamina {} --help", line, spec.name);
-  };
-  CLI::App app("", "lamina " + spec.name);
-  app.allow_extras();
-  app.set_help_all_flag("--help-all");
-
-  Arguments read;
-  read.given = arguments;
+struct ArgumentReader::State {
+  CLI::App app;
   std::vector<std::string_view> known = {"--help", "--help-all"};
   std::deque<std::vector<std::string>> values;  // addresses must not change
   std::deque<std::string> names;                // that `known` refers to
   std::vector<CLI::Option*> options;
+  std::vector<std::string> operands;
+};
+
+ArgumentReader::ArgumentReader(const CommandSpec& spec) : spec_(spec), state_(std::make_unique<State>()) {
+  CLI::App& app = state_->app;
+  app.name("lamina " + spec.name);
+  app.allow_extras();
+  app.set_help_all_flag("--help-all");
   for (const OptionSpec& option : spec.options) {
-    std::vector<std::string>& texts = values.emplace_back();
-    const std::string& flags = names.emplace_back(with_aliases(spec, option.flag));
-    options.push_back(
+    std::vector<std::string>& texts = state_->values.emplace_back();
+    const std::string& flags = state_->names.emplace_back(with_aliases(spec, option.flag));
+    state_->options.push_back(
         option.value.empty()
             ? app.add_flag(flags)
             : app.add_option(flags, texts)->type_name(option.value)->expected(1)->allow_extra_args(false)->take_all());
-    for (const std::string_view name : split(flags, ",")) known.push_back(name);
+    for (const std::string_view name : split(flags, ",")) state_->known.push_back(name);
   }
   if (!spec.operand.empty()) {
-    app.add_option(spec.operand, read.operands)->type_name("")->expected(0, 1 << 29);
+    app.add_option(spec.operand, state_->operands)->type_name("")->expected(0, 1 << 29);
   }
+}
+
+ArgumentReader::~ArgumentReader() = default;
+
+Result<Arguments> ArgumentReader::read(const std::vector<std::string>& arguments) {
+  const auto wrong = [&](const std::string& what) {
+    const std::string line = one_line(what);
+    if (line.ends_with('?')) return Error{Fault::kUsage, line};
+    return usage("{}; see lamina {} --help", line, spec_.name);
+  };
+  Arguments read;
+  read.given = arguments;
+  auto& [app, known, values, names, options, operands] = *state_;
+  for (std::vector<std::string>& texts : values) texts.clear();
+  operands.clear();
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {
-    read.help = help_text(spec, std::clamp(terminal_columns(), 40, 120), HelpLength::kShort);
+    read.help = help_text(spec_, std::clamp(terminal_columns(), 40, 120), HelpLength::kShort);
     return read;
   } catch (const CLI::CallForAllHelp&) {
-    read.help = help_text(spec, std::clamp(terminal_columns(), 40, 120), HelpLength::kAll);
+    read.help = help_text(spec_, std::clamp(terminal_columns(), 40, 120), HelpLength::kAll);
     return read;
   } catch (const CLI::Error& error) {
     return wrong(error.what());
   }
+  read.operands = operands;
   for (const std::string& extra : app.remaining()) {
     if (extra == "--") continue;
     const std::string_view name = std::string_view(extra).substr(0, extra.find('='));
-    for (const auto& [flag, why] : spec.absent) {
+    for (const auto& [flag, why] : spec_.absent) {
       if (name == flag) return wrong(fmt::format("{}: {}", flag, why));
     }
     if (!extra.starts_with('-')) return wrong(fmt::format("'{}': not expected here", extra));
-    const std::string hint = slicer_alias(name, spec);
+    const std::string hint = slicer_alias(name, spec_);
     return wrong(fmt::format("{}: no such option{}", name, hint.empty() ? suggest(name, known) : hint));
   }
   for (std::size_t i = 0; i < options.size(); ++i) {
-    const std::string& flag = spec.options[i].flag;
-    if (spec.options[i].value.empty()) {
+    const std::string& flag = spec_.options[i].flag;
+    if (spec_.options[i].value.empty()) {
       if (options[i]->count() > 0) read.options.emplace_back(flag, "");
       continue;
     }
     for (std::string& text : values[i]) {
       // -o --resume: an option without its value.
       if (std::ranges::find(known, std::string_view(text)) != known.end()) {
-        return wrong(fmt::format("{}: needs a value, {}, before {}", options[i]->get_name(), spec.options[i].value, text));
+        return wrong(fmt::format("{}: needs a value, {}, before {}", options[i]->get_name(), spec_.options[i].value, text));
       }
       read.options.emplace_back(flag, std::move(text));
     }
   }
   return read;
+}
+
+Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments) {
+  return ArgumentReader(spec).read(arguments);
 }
 
 std::string help_text(const CommandSpec& spec, int columns, HelpLength length) {

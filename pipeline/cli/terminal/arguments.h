@@ -1,6 +1,7 @@
 // pipeline/cli/terminal/arguments.h: the options of a command, and the arguments of one call.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -71,6 +72,20 @@ enum class HelpLength { kShort, kAll };
 
 /// The help of a command, in lines of `columns`; notes and examples stay as they are.
 std::string help_text(const CommandSpec& spec, int columns, HelpLength length);
+
+/// Reads the arguments of many calls of a command, which outlives it. For one thread.
+class ArgumentReader {
+ public:
+  explicit ArgumentReader(const CommandSpec& spec);
+  ~ArgumentReader();
+  /// As read_arguments(). cost  without making the parser, which takes most of its time
+  Result<Arguments> read(const std::vector<std::string>& arguments);
+
+ private:
+  struct State;
+  const CommandSpec& spec_;
+  std::unique_ptr<State> state_;
+};
 
 /// Parses the arguments after the command's name.
 /// errors  kUsage: unknown option (with the nearest name), missing value

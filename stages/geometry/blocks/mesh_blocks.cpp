@@ -153,6 +153,22 @@ void MeshBlocks::shift(const Point3& by) {
   }
 }
 
+Buffer<Triangle> list_of(const MeshBlocks& blocks) {
+  Buffer<Triangle> list;
+  list.reserve(blocks.triangle_count() + kTriangleSlack);
+  if (blocks.keeps_order()) {
+    list.resize(blocks.triangle_count());
+    for (std::uint32_t b = 0; b < blocks.block_count(); ++b)
+      blocks.list_block(b, std::span(list).subspan(blocks.first_triangle(b)));
+    return list;
+  }
+  for (std::uint32_t b = 0; b < blocks.block_count(); ++b) {
+    for (std::uint32_t i = 0; i < blocks.triangles_in(b); ++i)
+      list.push_back(blocks.triangle(b * MeshBlocks::kClusters + i / kClusterSize, i % kClusterSize));
+  }
+  return list;
+}
+
 void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster& out) {
   for (std::uint32_t k = 0; k < 3; ++k) {
     for (std::uint32_t i = 0; i < kClusterSize; i += 4) {

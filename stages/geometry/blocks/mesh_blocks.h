@@ -218,6 +218,9 @@ class MeshBlocks {
   std::span<Box> bounds_;  // in pages_: written first where blocks are made, by all threads
 };
 
+/// All triangles, in the order of the file where it is kept.
+Buffer<Triangle> list_of(const MeshBlocks& blocks);
+
 /// Of a list or of blocks.
 inline std::uint64_t triangle_count(const Mesh& mesh) {
   return mesh.blocks ? mesh.blocks->triangle_count() : mesh.triangles.size();

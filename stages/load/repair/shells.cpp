@@ -162,22 +162,6 @@ std::vector<ClosedShell> shells_of(const Mesh& mesh) {
 /// Whether no shell can be inverted. Bodies with an edge in common are one shell to the diagnosis.
 bool is_plain(const Diagnosis& found) { return found.inverted_shells == 0 && found.non_manifold_edges.count == 0; }
 
-Buffer<Triangle> list_of(const MeshBlocks& blocks) {
-  Buffer<Triangle> list;
-  list.reserve(blocks.triangle_count() + kTriangleSlack);
-  if (blocks.keeps_order()) {
-    list.resize(blocks.triangle_count());
-    for (std::uint32_t b = 0; b < blocks.block_count(); ++b)
-      blocks.list_block(b, std::span(list).subspan(blocks.first_triangle(b)));
-    return list;
-  }
-  for (std::uint32_t b = 0; b < blocks.block_count(); ++b) {
-    for (std::uint32_t i = 0; i < blocks.triangles_in(b); ++i)
-      list.push_back(blocks.triangle(b * MeshBlocks::kClusters + i / kClusterSize, i % kClusterSize));
-  }
-  return list;
-}
-
 /// Of each shell of negative volume, in order, the shells whose boxes overlap its own.
 std::vector<std::vector<std::uint32_t>> boxes_around(std::span<ClosedShell* const> shells) {
   std::vector<Box> boxes;

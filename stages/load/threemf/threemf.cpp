@@ -3,6 +3,11 @@
 
 #include <fmt/core.h>
 
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "stages/load/part_store.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/expansion.h"
 #include "stages/load/threemf/extensions.h"
@@ -33,12 +38,27 @@ void report_of_model(const ModelPackage& model, std::vector<Note>& notes) {
     notes.push_back({false, "names objects before it holds them, against the specification; they are planned all the same"});
 }
 
-}  // namespace
+/// What a file has, regardless of the job.
+struct UnplacedPackage {
+  ModelPackage model;
+  std::vector<Leaf> leaves;
+  std::vector<Note> notes;
+};
 
-Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
+std::uint64_t bytes_of(const UnplacedPackage& package) {
+  std::uint64_t bytes = sizeof(UnplacedPackage) + package.leaves.size() * sizeof(Leaf);
+  for (const ModelObject& object : package.model.objects) {
+    bytes += sizeof(ModelObject) + bytes_held(object.vertices) + bytes_held(object.triangles) +
+             object.components.size() * sizeof(ObjectReference);
+  }
+  return bytes;
+}
+
+Result<UnplacedPackage> read_package(const Source& source, const LoadOptions& options) {
   Result<Archive> archive = Archive::open(source, options);
   if (!archive) return archive.error();
-  ModelPackage model;
+  UnplacedPackage package;
+  ModelPackage& model = package.model;
   const Result<std::string> start = find_start_part(source, *archive, model);
   if (!start) return start.error();
   model.file_of(*start);
@@ -48,14 +68,39 @@ Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
       return parsed.error();
   }
   if (model.items.empty()) return source.error("has no build items: nothing is to be printed; export it again");
-  Package package;
   if (const Status given = apply_roles(source, *archive, model, package.notes); !given) return given.error();
   if (const Status known = resolve_references(source, model, options.triangle_limit); !known) return known.error();
   report_of_model(model, package.notes);
-  const Result<std::vector<Leaf>> leaves = expand_build(source, model, package.notes);
+  Result<std::vector<Leaf>> leaves = expand_build(source, model, package.notes);
   if (!leaves) return leaves.error();
-  if (const Status placed = snap_leaves(source, model, *leaves, options, package); !placed) return placed.error();
+  package.leaves = std::move(*leaves);
   return package;
+}
+
+/// From the store, if it has the file.
+Result<std::shared_ptr<const UnplacedPackage>> package_of(const Source& source, const LoadOptions& options) {
+  const std::string path(source.path());
+  const std::string key = fmt::format("3mf {} {} {}", options.triangle_limit, options.expanded_limit, path);
+  const std::optional<FileStamp> stamp = options.store ? file_stamp(path) : std::nullopt;
+  if (stamp) {
+    if (auto known = options.store->find<UnplacedPackage>(key, *stamp)) return known;
+  }
+  Result<UnplacedPackage> read = read_package(source, options);
+  if (!read) return read.error();
+  auto package = std::make_shared<const UnplacedPackage>(std::move(*read));
+  if (stamp) options.store->add(key, path, *stamp, package, bytes_of(*package));
+  return package;
+}
+
+}  // namespace
+
+Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
+  const auto unplaced = package_of(source, options);
+  if (!unplaced) return unplaced.error();
+  Package package;
+  package.notes = (*unplaced)->notes;
+  const Status placed = snap_leaves(source, (*unplaced)->model, (*unplaced)->leaves, options, package);
+  return placed ? Result<Package>(std::move(package)) : placed.error();
 }
 
 }  // namespace lamina::load

@@ -17,12 +17,37 @@ using Point = WindingTree::Point;
 constexpr std::uint32_t kLeaf = 8;
 constexpr double kFar = 2.5;  // distance over radius from which on a node is a dipole
 
-/// Half of the solid angle of a triangle from the origin.
-double half_angle(const Point& a, const Point& b, const Point& c) {
-  const double la = std::sqrt(dot(a, a)), lb = std::sqrt(dot(b, b)), lc = std::sqrt(dot(c, c));
-  const double below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-  return std::atan2(dot(a, cross(b, c)), below);
-}
+/// The sum of half of the solid angles of triangles from the origin. The angles of some triangles are added as the argument of
+/// a product of complex numbers: arctangents take most of the time.
+class HalfAngles {
+ public:
+  /// At most 8 triangles before the next call of sum(), for the size of the product: each is below 1e31.
+  void add(const Point& a, const Point& b, const Point& c) {
+    const double la = std::sqrt(dot(a, a)), lb = std::sqrt(dot(b, b)), lc = std::sqrt(dot(c, c));
+    const double below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb, above = dot(a, cross(b, c));
+    if (!(below > 0)) {
+      sum_ += std::atan2(above, below);
+      return;
+    }
+    // Both angles are below a quarter turn, so that no turn is lost.
+    const double real = real_ * below - imaginary_ * above;
+    imaginary_ = real_ * above + imaginary_ * below;
+    real_ = real;
+    if (!(real_ > 0)) take_product();
+  }
+  double sum() {
+    take_product();
+    return sum_;
+  }
+
+ private:
+  void take_product() {
+    sum_ += std::atan2(imaginary_, real_);
+    real_ = 1, imaginary_ = 0;
+  }
+
+  double sum_ = 0, real_ = 1, imaginary_ = 0;
+};
 
 }  // namespace
 
@@ -94,10 +119,12 @@ double WindingTree::at(const Point& point, std::uint64_t* inspected) const {
       angles += dot(node.normal, off) / (2 * square * std::sqrt(square));
     } else if (node.second == 0) {
       visits += node.end - node.begin;
+      HalfAngles of_leaf;
       for (std::uint32_t i = node.begin; i < node.end; ++i) {
         const Corners& f = facets_[i];
-        angles += half_angle(minus(f.a, point), minus(f.b, point), minus(f.c, point));
+        of_leaf.add(minus(f.a, point), minus(f.b, point), minus(f.c, point));
       }
+      angles += of_leaf.sum();
     } else {
       stack[height++] = node.second;
       stack[height++] = index + 1;

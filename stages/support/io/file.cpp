@@ -369,6 +369,21 @@ std::optional<FileId> file_id(const std::string& path) {
   return FileId{status.st_dev, status.st_ino};
 }
 
+std::optional<FileStamp> file_stamp(const std::string& path) {
+  constexpr std::int64_t kStepNs = 100'000'000;
+  const auto ns = [](const timespec& time) { return time.tv_sec * 1'000'000'000 + time.tv_nsec; };
+  struct stat now {};
+  timespec clock{};
+  errno = 0;
+  ::clock_gettime(CLOCK_REALTIME, &clock);
+  if (::stat(path.c_str(), &now) != 0 || !S_ISREG(now.st_mode)) return std::nullopt;
+  return FileStamp{{now.st_dev, now.st_ino},
+                   static_cast<std::uint64_t>(now.st_size),
+                   ns(now.st_mtim),
+                   ns(now.st_ctim),
+                   ns(clock) - ns(now.st_ctim) > kStepNs};
+}
+
 bool same_file(const std::string& a, const std::string& b) {
   const std::optional<FileId> first = file_id(a);
   return first && first == file_id(b);

@@ -120,6 +120,19 @@ struct FileId {
 /// Of what a name leads to; nothing if it is absent.
 std::optional<FileId> file_id(const std::string& path);
 
+/// The state of a regular file: a file with an equal stamp is unchanged, if the first stamp is settled.
+struct FileStamp {
+  FileId id;
+  std::uint64_t bytes = 0;
+  std::int64_t modified_ns = 0, changed_ns = 0;
+  bool settled = false;  // the last change was longer ago than a step of the clock of files, so the next one has another time
+  friend bool operator==(const FileStamp& a, const FileStamp& b) {
+    return a.id == b.id && a.bytes == b.bytes && a.modified_ns == b.modified_ns && a.changed_ns == b.changed_ns;
+  }
+};
+/// errors  nothing if the file is absent (errno), or not regular (errno is 0)
+std::optional<FileStamp> file_stamp(const std::string& path);
+
 /// Whether two names lead to the same file or directory, by device and inode; false if one of them is absent.
 bool same_file(const std::string& a, const std::string& b);
 

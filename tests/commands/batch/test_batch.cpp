@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "tests/commands/batch/batch.h"
@@ -214,6 +215,53 @@ TEST_F(JobsInBatch, NamesOfPartsAreNoReasonToWriteOverTheBatchAndAbsoluteOutputs
   EXPECT_EQ(outcome.err, "");
   EXPECT_EQ(summary("out")["jobs"][0]["output"], "summary.json-2");
   EXPECT_EQ(lamina({"verify", "keep", "--quiet"}).code, 0);
+}
+
+TEST_F(JobsInBatch, PartsThatJobsShareAreThoseOfSeparateRuns) {
+  const std::string corpus = LAMINA_TEST_DIR "/corpus/";
+  const Words parts = {corpus + "dental_crown.stl", corpus + "broken/cube_missing_corner.stl",
+                       corpus + "cube_gears_17_items.3mf", corpus + "broken/nut_nan_inf.stl"};
+  const Words options = {"",
+                         "--dpi 200",
+                         "--no-repair --allow-empty",
+                         "--weld 50",
+                         "--scale 2",
+                         "--rotate 0,0,30",
+                         "--drop-bad",
+                         "--fill-rule evenodd",
+                         "--copies 2",
+                         "--engine contours"};
+  Words lines;
+  std::string list;
+  for (int round = 0; round < 2; ++round) {
+    for (const std::string& part : parts) {
+      for (const std::string& option : options) {
+        lines.push_back("jet " + part + " --bed 300x300 --dpi 60 --layer 1 " + option);
+        list += lines.back() + " -o " + std::to_string(lines.size()) + "\n";
+      }
+    }
+  }
+  write_text(directory_ / "list.txt", list);
+  lamina({"batch", "list.txt", "-o", "out", "--jobs", "2", "--quiet"});
+  const Json json = summary("out");
+  ASSERT_EQ(json["jobs"].size(), lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    SCOPED_TRACE(lines[i]);
+    const Json &job = json["jobs"][i], &twin = json["jobs"][(i + lines.size() / 2) % lines.size()];
+    EXPECT_EQ(job["reason"], twin["reason"]);
+    EXPECT_EQ(job["hash"], twin["hash"]);
+    if (i >= lines.size() / 2) continue;
+    std::istringstream stream(lines[i] + " --quiet --overwrite --json -o alone");
+    const Outcome alone = lamina({std::istream_iterator<std::string>(stream), {}});
+    EXPECT_EQ(job["code"], alone.code) << alone.err;
+    if (alone.code != 0) {
+      EXPECT_NE(alone.err.find(job["reason"].get<std::string>()), std::string::npos) << alone.err;
+      continue;
+    }
+    EXPECT_EQ(tree_text(directory_ / "alone"), tree_text(directory_ / ("out/" + std::to_string(i + 1))));
+    EXPECT_EQ(job["result"]["warnings"], Json::parse(alone.out)["warnings"]);
+    EXPECT_EQ(job["result"]["parts"], Json::parse(alone.out)["parts"]);
+  }
 }
 
 TEST_F(JobsInBatch, QuietItStillSaysWhichJobsFail) {

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "pipeline/batch/summary.h"
+#include "stages/load/part_store.h"
 #include "stages/support/text/json_value.h"
 #include "tests/commands/program.h"
 
@@ -39,6 +40,31 @@ Result<BatchSummary> run_jobs(const test::Directory& directory, const std::vecto
   const RunJob run = [runs](const BatchJob& job, const CallSettings& settings, const ProgressCallback& progress,
                             const std::atomic<bool>& cancel) { return runs[job.number - 1](settings, progress, cancel); };
   return run_batch(std::make_shared<const std::vector<BatchJob>>(jobs), std::move(*record), options, run, watcher, interrupt);
+}
+
+TEST(BatchQueue, SharedPartsLeaveTheirMemoryToJobs) {
+  const test::Directory directory;
+  test::write_text(directory / "part", "a part");
+  std::this_thread::sleep_for(std::chrono::milliseconds(130));  // a file that was written just now is not stored
+  BatchOptions options;
+  options.directory = directory.path().string();
+  options.memory_bytes = 100;
+  options.loaded = std::make_shared<load::PartStore>(loaded_share(100, 0));
+  std::vector<std::uint64_t> stored;
+  const RunOne fill = [&](const CallSettings&, const ProgressCallback&, const std::atomic<bool>&) {
+    stored.push_back(options.loaded->bytes());
+    for (const char* key : {"a", "b", "c", "d"}) {
+      options.loaded->add(key, directory / "part", *file_stamp(directory / "part"), std::make_shared<const int>(1), 10);
+    }
+    stored.push_back(options.loaded->bytes());
+    BatchResult result;
+    result.outcome = BatchOutcome::kDone;
+    return result;
+  };
+  std::vector<BatchJob> jobs;
+  for (const std::uint32_t number : {1, 2, 3, 4}) jobs.push_back(job_of(number, std::vector{10, 85, 200, 10}[number - 1], ""));
+  ASSERT_TRUE(run_jobs(directory, jobs, {fill, fill, fill, fill}, options).ok());
+  EXPECT_EQ(stored, (std::vector<std::uint64_t>{0, 20, 10, 10, 0, 0, 0, 20})) << "a quarter, and what jobs leave";
 }
 
 TEST(BatchQueue, JobsShareThreadsAndMemoryAndEachIsReportedOnce) {

@@ -131,6 +131,35 @@ TEST(SlicerAliases, WithOurMeaningAreAcceptedUnderOurName) {
   EXPECT_FALSE(read_arguments(pipeline::spec_of(*pipeline::find_command("info")), {"--layer-height", "0.2"}));
 }
 
+TEST(ArgumentReaders, NoCallDependsOnAnEarlierOne) {
+  const std::vector<std::vector<std::string>> calls = {{"a.stl", "b.stl", "--layer", "0.2", "--dry-run", "-o", "out"},
+                                                       {},
+                                                       {"c.stl", "--set", "bed.dpi=300", "--set", "run.sync=off"},
+                                                       {"--layer"},
+                                                       {"d.stl", "--no-such-option"},
+                                                       {"-o", "--resume"},
+                                                       {"--help"},
+                                                       {"--layer-height=0.3", "--", "-e.stl"},
+                                                       {"a.stl", "--set", "bed.dpi=600"}};
+  for (const std::string name : {"jet", "extrude", "info", "merge"}) {
+    const CommandSpec spec = spec_of(*find_command(name));
+    ArgumentReader reader(spec);
+    for (std::size_t i = 0; i < 3 * calls.size(); ++i) {
+      const auto& call = calls[i * 5 % calls.size()];
+      const auto again = reader.read(call), once = read_arguments(spec, call);
+      ASSERT_EQ(again.ok(), once.ok()) << name << ", call " << i;
+      if (!once) {
+        EXPECT_EQ(again.error().message, once.error().message);
+        continue;
+      }
+      EXPECT_EQ(again->options, once->options) << name << ", call " << i;
+      EXPECT_EQ(again->operands, once->operands) << name << ", call " << i;
+      EXPECT_EQ(again->given, once->given);
+      EXPECT_EQ(again->help, once->help);
+    }
+  }
+}
+
 TEST(Suggestions, TheShorterOfTwoNamesThatHoldTheWordIsNearer) {
   const std::vector<std::string_view> names = {"nuferbj-31", "nuferbj-360dpi", "nuferbj"};
   EXPECT_EQ(suggest("nuferb", names), "; did you mean 'nuferbj'?");

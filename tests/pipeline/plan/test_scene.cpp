@@ -1,6 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <thread>
+
 #include "pipeline/plan/scene.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/load/part_store.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -99,6 +106,27 @@ TEST(Scene, OverlapsOfRequestedPositionsAreNoted) {
   job.parts[1].at_mm = {0, 0};
   job.parts[1].bottom_mm = 10;  // one above the other
   EXPECT_TRUE(loaded(job).parts[1].notes.empty());
+}
+
+TEST(Scene, PartsThatJobsShareStayWhereTheirFileHasThem) {
+  const Directory directory;
+  test::write_box(directory / "far.stl", {-1500, 0, 0}, {-1490, 10, 10});
+  std::this_thread::sleep_for(std::chrono::milliseconds(130));  // a file that was written just now is not stored
+  Job job;
+  job.bed_mm = {2000, 2000};
+  job.loaded = std::make_shared<load::PartStore>(1u << 20);
+  for (const double x : {1900.0, 1900.0, 0.0}) {  // farther from the file's position than 32 bits of nanometres, and nearer
+    job.parts = {{.path = directory / "far.stl", .at_mm = {{x, 0}}}};
+    const auto scene = load_scene(job, bare_bed(job), MeshForm::kBlocks);
+    ASSERT_TRUE(scene.ok()) << scene.error().message;
+    const Mesh& mesh = scene->meshes[0];
+    EXPECT_EQ(mesh.blocks == nullptr, x > 0);
+    Box box;
+    each_vertex(mesh, [&](const Point3& p) { box.add(p); });
+    EXPECT_EQ(box.lo, mesh.bounds.lo) << x;
+    EXPECT_EQ(std::int64_t{box.lo.x} + scene->instances[0].offset.x, std::llround(x * 1e6));
+  }
+  EXPECT_EQ(job.loaded->hits(), 2u);
 }
 
 TEST(Scene, FlatPartIsRefusedAsInput) {
