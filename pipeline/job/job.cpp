@@ -6,6 +6,7 @@
 
 #include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
+#include "stages/formats/image_format.h"
 #include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"
 
@@ -82,6 +83,11 @@ Status check_job(const Job& job) {
     if ((job.layers || job.shard) && job.inspect)
       return usage(
           "--container: sections that --inspect keeps of some layers need a directory; inspect all layers, or remove it");
+    if (job.container == Container::kTiff && job.shard)
+      return usage("--shard: shards of one directory exclude --container tiff; name layers by --layers, or use zip");
+    if (const auto extension = formats::extension_of(job.format);
+        job.container == Container::kTiff && extension && *extension != ".tif")
+      return usage("--format {}: --container tiff needs images in TIFF files; use tiff-g4, or --container zip", job.format);
     if (output_of(job.output, job.container) != job.output)
       return usage("-o {}: a container is a ZIP file; end its name with .zip", job.output);
   }
@@ -93,7 +99,7 @@ Status check_job(const Job& job) {
 constexpr std::string_view kContainerEnd = ".zip";
 
 std::string output_of(std::string output, Container container) {
-  if (container == Container::kNone || output.empty() || output.ends_with(kContainerEnd)) return output;
+  if (container != Container::kZip || output.empty() || output.ends_with(kContainerEnd)) return output;
   while (output.size() > 1 && output.ends_with('/')) output.pop_back();
   return output += kContainerEnd;
 }

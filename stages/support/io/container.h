@@ -37,14 +37,17 @@ struct OpenedEntry {
   int file = -1;      // owned by the caller; -1: none
   std::string fault;  // of the container; "": errno states why there is no descriptor, ENOENT for no such entry
 };
-/// The container is read again once its file has changed.
+/// Also of a file in the pages of a job (paged.h). The container is read again once its file has changed.
 /// cost  copies the entry into memory
 OpenedEntry open_entry(const std::string& path);
 
-/// Whether a path leads through a container to an entry; its size. cost  some system calls
+/// A descriptor of some bytes of a file alone. cost  copies them into memory
+OpenedEntry copy_range(int file, std::uint64_t offset, std::uint64_t bytes);
+
+/// Whether a path leads through a container, or through the pages of a job, to an entry; its size. cost  some system calls
 std::optional<std::uint64_t> entry_bytes(const std::string& path);
 
-/// The names in a folder, of a directory or a container, without order; empty if there is none. Of a container files alone.
+/// The names in a folder, of a directory, a container or the pages of a job, without order; empty if there is none. Of a container files alone.
 std::vector<std::string> names_in_folder(const std::string& folder);
 
 }  // namespace lamina
