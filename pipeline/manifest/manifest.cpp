@@ -440,8 +440,13 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   return reported;
 }
 
+std::string manifest_of_layer(const std::string& image) {
+  const fs::path manifest = fs::path(image).parent_path() / "../manifest.json";
+  return is_file(manifest.string()) ? manifest.string() : manifest.lexically_normal().string();
+}
+
 bool are_grey_drops(const std::string& image) {
-  const std::string manifest = (fs::path(image).parent_path() / "../manifest.json").string();
+  const std::string manifest = manifest_of_layer(image);
   if (product_of_manifest(manifest) != Product::kImages) return false;
   const auto read = read_manifest(manifest);
   return read && read->head.grey_drops();

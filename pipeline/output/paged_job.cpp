@@ -86,6 +86,9 @@ Status remove_all_of(const std::vector<std::string>& files) {
 }  // namespace
 
 Status check_kind_of_output(const Job& job) {
+  if (const std::string machine = job.output + "/machine.toml";
+      job.container == Container::kTiff && same_file(job.machine.profile, machine))
+    return usage("{}: is read by this call as the machine profile, and would be replaced; name another directory", machine);
   if (job.overwrite) return {};
   constexpr std::string_view kAdvice = "replace it with --overwrite, or name another directory";
   const std::string pages = pages_path(job.output);
@@ -174,8 +177,9 @@ Result<PagedJob> PagedJob::open(const Job& job, const ManifestHead& head, bool b
   paged.program_.emplace(std::move(*file));
   if (kept.last) return paged;
   status = program->give_start([&](const std::string& name, std::span<const std::byte> bytes) {
-    return name == "program/machine.toml" ? write_file(job.output + "/machine.toml", bytes, layer_file_options(job))
-                                          : paged.program_->append(bytes);
+    return name == "program/machine.toml"
+               ? write_file(job.output + "/machine.toml", bytes, {.follow = false, .durable = how.durable})
+               : paged.program_->append(bytes);
   });
   return status ? Result<PagedJob>(std::move(paged)) : status.error();
 }
