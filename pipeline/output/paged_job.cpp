@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "pipeline/job/errors.h"
-#include "pipeline/manifest/compare.h"
 #include "pipeline/manifest/layer_files.h"
 #include "pipeline/output/directory.h"
+#include "pipeline/output/job_container.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
@@ -23,64 +23,34 @@ std::string program_file(const Job& job, const ManifestHead& head) {
   return fmt::format("{}/program{}", job.output, head.program_extension);
 }
 
-/// Whether the frame of the program is what the job writes. end  the text after the last layer too
-bool has_program_frame(const std::string& directory, const ManifestHead& head, bool end) {
-  if (head.machine.empty()) return true;
-  const std::string& extension = head.program_extension;
-  return fault_of_file(directory, "program/machine.toml", head.machine_profile).empty() &&
-         fault_of_file(directory, "program/start" + extension, head.program_start).empty() &&
-         (!end || fault_of_file(directory, "program/end" + extension, head.program_end).empty());
-}
-
-/// Compares the pages of a file with those that the job writes, in their order.
-class PageComparison {
- public:
-  PageComparison(const ManifestHead& head, const PageList& pages, const FileReader& file)
-      : head_(head), pages_(pages), file_(file) {}
-
-  /// Takes the pages of a layer, if they are the next ones.
-  bool take(const LayerRecord& record) {
-    const std::size_t before = next_;
-    for (const LayerImageFile& image : layer_images(head_, record)) {
-      if (next_ == pages_.pages.size()) return false;
-      const JobPage& page = pages_.pages[next_];
-      const std::string program =
-          next_ == before ? program_file_name(record.layer.index, head_.program_extension) : std::string();
-      if (page.content.name != image.name || page.content.program != program) return false;
-      if (!program.empty() && next_ > 0 && page.content.program_offset != program_end_) return false;
-      if (!formats::tiff::fault_of_page(file_, page, pages_.big).empty()) return false;
-      if (!program.empty()) program_end_ = page.content.program_offset + page.content.program_bytes;
-      ++next_;
+/// Keeps the first layers whose pages are those that the job writes, in their order.
+void keep_pages(const ManifestHead& head, const PageList& found, const FileReader& file, const std::vector<LayerRecord>& layers,
+                KeptPages& kept) {
+  std::size_t next = 0;
+  for (const LayerRecord& record : layers) {
+    if (record.layer.index != head.first_layer + kept.layers.size()) return;
+    std::string program = program_file_name(record.layer.index, head.program_extension);
+    std::uint64_t program_end = kept.program_end;
+    for (const LayerImageFile& image : layer_images(head, record)) {
+      if (next == found.pages.size()) return;
+      const JobPage& page = found.pages[next++];
+      const PageContent& content = page.content;
+      if (content.name != image.name || content.program != program) return;
+      if (!formats::tiff::fault_of_page(file, page, found.big).empty()) return;
+      if (!program.empty() && kept.last && content.program_offset != program_end) return;
+      if (!program.empty()) program_end = content.program_offset + content.program_bytes;
+      program.clear();  // the first image names it
     }
-    last_ = pages_.pages[next_ - 1];
-    return true;
+    kept.program_end = program_end;
+    kept.last = found.pages[next - 1];
+    kept.layers.push_back(record);
   }
-  /// All that was taken so far.
-  const std::optional<JobPage>& last() const { return last_; }
-  std::uint64_t program_end() const { return program_end_; }
-
- private:
-  const ManifestHead& head_;
-  const PageList& pages_;
-  const FileReader& file_;
-  std::size_t next_ = 0;
-  std::optional<JobPage> last_;
-  std::uint64_t program_end_ = 0;
-};
+}
 
 /// Gives a finished file the name of an unfinished one. errors  kOutput
 Status reopen_name(const std::string& file) {
   if (!is_file(file) || is_file(part_of(file))) return {};
   return std::rename(file.c_str(), part_of(file).c_str()) == 0 ? Status() : Status(write_failure(file, errno));
-}
-
-Status remove_all_of(const std::vector<std::string>& files) {
-  for (const std::string& file : files) {
-    std::error_code error;
-    fs::remove(file, error);
-    if (error) return write_failure(file, error.value());
-  }
-  return {};
 }
 
 }  // namespace
@@ -141,17 +111,8 @@ Result<KeptPages> find_kept_pages(const Job& job, const ManifestHead& head, bool
   const auto pages = read_pages(path);
   const auto file = FileReader::open(path, {});
   if (!pages || !file || pages->big != big) return kept;
-  PageComparison comparison(head, *pages, *file);
-  std::size_t count = 0;
-  while (count < layers->size() && (*layers)[count].layer.index == head.first_layer + count &&
-         comparison.take((*layers)[count]))
-    ++count;
-  if (count == 0) return kept;
-  layers->resize(count);
-  kept.layers = std::move(*layers);
-  kept.last = comparison.last();
-  kept.program_end = comparison.program_end();
-  kept.finished = count == head.last_layer - head.first_layer && is_file(manifest) && path == pages_file(job) &&
+  keep_pages(head, *pages, *file, *layers, kept);
+  kept.finished = kept.layers.size() == head.last_layer - head.first_layer && is_file(manifest) && path == pages_file(job) &&
                   has_program_frame(job.output, head, true) && formats::tiff::fault_of_pages(path).empty();
   return kept;
 }
@@ -161,8 +122,10 @@ Result<PagedJob> PagedJob::open(const Job& job, const ManifestHead& head, bool b
   FileOptions how{.keep_part = true, .follow = false, .replace = job.resume || job.overwrite};
   if (job.sync == Sync::kOff) how.durable = Durable::kNo;
   // The record of an earlier run, which the begun one replaces, goes before its files do.
-  Status status = remove_all_of({job.output + "/" + manifest_name(job)});
-  if (status && !kept.last) status = remove_all_of(paged_job_files(job.output));
+  std::error_code error;
+  fs::remove(job.output + "/" + manifest_name(job), error);
+  Status status = error ? Status(write_failure(job.output, error.value())) : Status();
+  if (status && !kept.last) status = remove_layers(job.output);
   if (status && kept.last) status = reopen_name(pages_file(job));
   if (status && kept.last && program != nullptr) status = reopen_name(program_file(job, head));
   if (!status) return status.error();

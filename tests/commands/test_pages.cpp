@@ -19,7 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::string kPlainPages = "jet part.stl --bed 40x40 --dpi 300 --layer 0.1",
-                  kPagesWithProgram = "jet part.stl --machine jet1000 --layer 0.1", kAsPages = " --container tiff --quiet";
+                  kPagesWithProgram = "jet part.stl --machine jet1000 --layer 0.1", kAsPages = " --container tiff --quiet",
+                  kTwoPowders =
+                      "jet part.stl part.stl --material steel,bronze --machine nuferbj --vat-rule majority --layer 0.2";
 
 class PagedJobs : public ::testing::Test {
  protected:
@@ -61,9 +63,9 @@ class PagedJobs : public ::testing::Test {
 };
 
 TEST_F(PagedJobs, HaveTheFilesOfFolders) {
-  const std::string powders = "jet part.stl --machine jet1000 --layer 0.3 --saturation 60 --inspect";
-  for (const std::string& job : {kPlainPages + " --layers 3:9 --title box", kPlainPages + " --levels 16 --format tiff-4",
-                                 powders, kPagesWithProgram + " --heights cusp --thickness 0.05..0.2",
+  const std::string doses = "jet part.stl --machine jet1000 --layer 0.3 --saturation 60 --inspect";
+  for (const std::string& job : {kPlainPages + " --layers 3:9 --title box", kPlainPages + " --levels 16 --format tiff-4", doses,
+                                 kTwoPowders, kPagesWithProgram + " --heights cusp --thickness 0.05..0.2",
                                  std::string("jet part.stl --bed 1500x1500 --dpi 600 --layer 0.5")}) {
     lamina(job + " -o out --quiet");
     lamina(job + " -o paged" + kAsPages);
@@ -98,7 +100,7 @@ TEST_F(PagedJobs, AreReadLikeFolders) {
 
 TEST_F(PagedJobs, ContinueAfterAnyInterruptionWithTheSameBytes) {
   std::mt19937 draw(7);
-  for (const std::string& job : {kPlainPages, kPagesWithProgram + " --inspect"}) {
+  for (const std::string& job : {kPlainPages, kTwoPowders, kPagesWithProgram + " --inspect"}) {
     lamina(job + " -o whole" + kAsPages);
     const std::string whole = tree_text(directory_ / "whole");
     for (int trial = 0; trial < 12; ++trial) {
