@@ -162,8 +162,8 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
 
 Result<formats::Image> printed_pixels(const std::string& image) {
   auto dark = formats::dark_pixels(image, are_grey_drops(image) ? 255 : 128);
-  const fs::path folder = fs::path(image).parent_path(), job = folder / "..";
-  const auto manifest = dark ? read_manifest((job / "manifest.json").string()) : dark.error();
+  const fs::path path = manifest_of_layer(image), job = path.has_parent_path() ? path.parent_path() : ".";
+  const auto manifest = dark ? read_manifest(path.string()) : dark.error();
   if (!manifest || !manifest->head.geometry) return dark;
   const std::string name = "layers/" + fs::path(image).filename().string();
   for (const LayerRecord& record : manifest->layers) {

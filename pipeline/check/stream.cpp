@@ -12,6 +12,7 @@
 #include "pipeline/output/print_program.h"
 #include "stages/support/io/compressed.h"
 #include "stages/support/io/container.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
@@ -91,6 +92,8 @@ Status write_program(const std::string& directory, const Manifest& manifest, con
 Result<StreamReport> stream_program(const std::string& directory, const std::string& output, bool consume) {
   if (consume && is_container(directory))
     return usage("{}: --consume deletes no files of a container; unpack it and name the folder", directory);
+  if (consume && !pages_path(directory).empty())
+    return usage("{}: --consume deletes no pages; leave it out, or plan the job without --container tiff", directory);
   std::optional<Claim> claim;
   if (std::error_code error; consume && fs::is_directory(directory, error)) {
     auto taken = Claim::take((fs::path(directory) / "manifest.json").string(), directory);

@@ -25,12 +25,14 @@
 #include "stages/data/levels.h"
 #include "stages/data/shortage.h"
 #include "stages/formats/images/image.h"
+#include "stages/formats/tiff/pages.h"
 #include "stages/replay/frame.h"
 #include "stages/replay/totals.h"
 #include "stages/support/hash/hash.h"
 #include "stages/support/io/compressed.h"
 #include "stages/support/io/container.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/memory_gate.h"
 
 namespace lamina::pipeline {
@@ -341,6 +343,16 @@ void check_layers(const std::string& directory, const Manifest& manifest, const 
 /// consumed  layers, of which a killed run may have left files
 void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, std::uint32_t consumed,
                   VerifyReport& report) {
+  if (const std::string pages = pages_path(directory); !pages.empty() && !manifests.empty()) {
+    if (std::string fault = formats::tiff::fault_of_pages(pages); !fault.empty()) report.add(std::move(fault));
+    const std::string program = "program" + manifests[0].head.program_extension;
+    for (const std::string& file : paged_job_files(directory)) {
+      const std::string name = fs::path(file).filename().string();
+      const bool of_program = name == program || name == "machine.toml";
+      if (name != kPagesFile && (!of_program || manifests[0].head.machine.empty()))
+        report.add(fmt::format("{}: no manifest names it", name));
+    }
+  }
   std::vector<LayersOfJob> jobs;
   for (const Manifest& manifest : manifests) {
     const std::uint32_t first = manifest.head.first_layer;

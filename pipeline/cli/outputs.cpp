@@ -13,6 +13,7 @@
 #include "pipeline/report/job_cost.h"
 #include "stages/formats/voxels/image.h"
 #include "stages/support/io/file.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -107,6 +108,9 @@ std::vector<Taken> taken_by(std::span<const std::string> outputs) {
     taken.push_back({&output, *own, false});
     for (const char* below : {"/layers", "/program"}) {
       if (const auto id = file_id(output + below)) taken.push_back({&output, *id, true});
+    }
+    for (const std::string& file : paged_job_files(output)) {
+      if (const auto id = file_id(file)) taken.push_back({&output, *id, false});
     }
   }
   return taken;

@@ -7,6 +7,7 @@
 
 #include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
+#include "stages/formats/image_format.h"
 #include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"
 #include "stages/support/io/file.h"
@@ -85,7 +86,12 @@ Status check_job(const Job& job) {
     if ((job.layers || job.shard) && job.inspect)
       return usage(
           "--container: sections that --inspect keeps of some layers need a directory; inspect all layers, or remove it");
-    if (!job.output.empty() && !names_container(job.output))
+    if (job.container == Container::kTiff && job.shard)
+      return usage("--shard: shards of one directory exclude --container tiff; name layers by --layers, or use zip");
+    if (const auto extension = formats::extension_of(job.format);
+        job.container == Container::kTiff && extension && *extension != ".tif")
+      return usage("--format {}: --container tiff needs images in TIFF files; use tiff-g4, or --container zip", job.format);
+    if (job.container == Container::kZip && !job.output.empty() && !names_container(job.output))
       return usage("-o {}: a container is a ZIP file; end its name with .zip", job.output);
   }
   if (job.output.empty() && !job.dry_run)
@@ -99,7 +105,7 @@ bool names_container(std::string_view path) {
 }
 
 std::string output_of(std::string output, Container container) {
-  if (container == Container::kNone || is_stream(output)) return output;
+  if (container != Container::kZip || is_stream(output)) return output;
   while (output.size() > 1 && output.ends_with('/')) output.pop_back();
   const std::string name = std::filesystem::path(output).filename().string();
   if (name.empty() || name == "." || name == ".." || names_container(output)) return output;

@@ -198,7 +198,7 @@ struct Job {
   std::uint32_t threads = 0;                           // 0: all of the host
   std::uint64_t memory_bytes = 1ull << 30;             // budget of the layers in flight
   Sync sync = Sync::kJob;                              // what survives a power cut
-  Container container = Container::kNone;              // of images; output is the name of its file
+  Container container = Container::kNone;              // of images; of kZip, output is the name of its file
   std::optional<std::array<std::uint32_t, 2>> layers;  // [first, last) only
   std::optional<std::array<std::uint32_t, 2>> shard;   // i of n, i from 0
   bool resume = false;
@@ -229,7 +229,7 @@ Status check_job(const Job& job);
 /// Whether the name of a file ends in .zip.
 bool names_container(std::string_view path);
 
-/// The name of a job's output: with a container, DIR becomes DIR.zip. Names of no file stay: `-`, a device, `.` and `..`.
+/// The name of a job's output: with a ZIP container, DIR becomes DIR.zip. Names of no file stay: `-`, a device, `.` and `..`.
 std::string output_of(std::string output, Container container);
 
 /// Section [heights] as checked options of the stage. errors  kUsage, one line that begins with the key

@@ -409,7 +409,7 @@ const JobKey kExtrudeKeys[] = {
 
 constexpr Word<Engine> kEngines[] = {{"rays", Engine::kRays}, {"contours", Engine::kContours}, {"both", Engine::kBoth}};
 
-constexpr Word<Container> kContainers[] = {{"none", Container::kNone}, {"zip", Container::kZip}};
+constexpr Word<Container> kContainers[] = {{"none", Container::kNone}, {"zip", Container::kZip}, {"tiff", Container::kTiff}};
 
 constexpr Word<Sync> kSyncs[] = {{"layer", Sync::kLayer}, {"job", Sync::kJob}, {"off", Sync::kOff}};
 
@@ -501,7 +501,7 @@ const JobKey kRunKeys[] = {
     word<kSyncs, &Job::sync>(
         {"run", "sync", "--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off"}),
     word<kContainers, &Job::container>(
-        {"run", "container", "--container", "KIND", "zip: all files of the job in one ZIP file, -o FILE.zip; or none"}),
+        {"run", "container", "--container", "KIND", "zip: one ZIP file, -o FILE.zip; tiff: layers as pages; none"}),
     custom<Job, read_pair<read_layer_range>, write_layers, &Job::layers>(
         {"run", "layers", "--layers", "A:B", "plan layers A to B - 1 only, from 0 at the bottom; also A: and :B"},
         Form::kString),

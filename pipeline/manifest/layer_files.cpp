@@ -11,6 +11,7 @@
 #include "stages/program/dialect.h"
 #include "stages/support/io/compressed.h"
 #include "stages/support/io/container.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/number_text.h"
 
@@ -88,7 +89,7 @@ bool lies_in_job(const std::string& file, const std::string& directory) {
   if (inside.empty()) return false;
   const fs::path& first = *inside.begin();
   ManifestFile manifest;
-  return first == "layers" || first == "program" || is_manifest(inside.string(), manifest);
+  return first == "layers" || first == "program" || first == kPagesFile || is_manifest(inside.string(), manifest);
 }
 
 std::vector<ManifestFile> find_manifests(const std::string& directory) {
@@ -154,7 +155,7 @@ bool is_job_file_name(const fs::path& name) {
 }
 
 bool holds_layers(const std::string& directory) {
-  return !layer_files(directory).empty() || !program_frames(directory).empty();
+  return !layer_files(directory).empty() || !program_frames(directory).empty() || !pages_path(directory).empty();
 }
 
 Status check_stays_inside(const std::string& directory) {
@@ -174,6 +175,7 @@ Status remove_layers(const std::string& directory) {
   std::error_code error;
   std::vector<fs::path> old = layer_files(directory);
   for (fs::path& file : program_frames(directory)) old.push_back(std::move(file));
+  for (const std::string& file : paged_job_files(directory)) old.emplace_back(file);
   for (const fs::path& file : old) {
     fs::remove(file, error);
     if (error) return Error{Fault::kOutput, fmt::format("{}: {}", file.string(), error.message())};

@@ -23,7 +23,7 @@ struct ManifestFile {
 /// All manifests of a directory, the whole job's first, then by shard; empty if the directory is missing.
 std::vector<ManifestFile> find_manifests(const std::string& directory);
 
-/// Whether a file, there or not, is or would be one of a job's directory: a manifest, or anything in layers/ or program/. Names
+/// Whether a file, there or not, is or would be one of a job's directory: a manifest, layers.tif, or anything in layers/ or program/. Names
 /// are followed through links.
 bool lies_in_job(const std::string& file, const std::string& directory);
 
@@ -46,7 +46,7 @@ bool holds_layers(const std::string& directory);
 /// errors  kOutput
 Status check_stays_inside(const std::string& directory);
 
-/// Removes all layers and print programs of a directory; its folders stay.
+/// Removes all layers and print programs of a directory, in folders or in pages; its folders stay.
 /// errors  kOutput with the system's reason
 Status remove_layers(const std::string& directory);
 

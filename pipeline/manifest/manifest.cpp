@@ -15,6 +15,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
@@ -403,7 +404,8 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   if (!fs::is_directory(path, ignored)) return reported;
   std::string manifest = path + "/manifest.json";
   if (product_of_manifest(manifest) == Product::kImages) {
-    reported.path = path + "/layers";
+    const std::string pages = pages_path(path);
+    reported.path = pages.empty() ? path + "/layers" : pages;
   } else {
     manifest = (fs::path(path).lexically_normal() / "../manifest.json").string();
     if (!fs::equivalent(path, fs::path(path) / "../layers", ignored) || product_of_manifest(manifest) != Product::kImages)
@@ -438,8 +440,13 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   return reported;
 }
 
+std::string manifest_of_layer(const std::string& image) {
+  const fs::path manifest = fs::path(image).parent_path() / "../manifest.json";
+  return is_file(manifest.string()) ? manifest.string() : manifest.lexically_normal().string();
+}
+
 bool are_grey_drops(const std::string& image) {
-  const std::string manifest = (fs::path(image).parent_path() / "../manifest.json").string();
+  const std::string manifest = manifest_of_layer(image);
   if (product_of_manifest(manifest) != Product::kImages) return false;
   const auto read = read_manifest(manifest);
   return read && read->head.grey_drops();

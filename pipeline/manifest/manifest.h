@@ -151,6 +151,9 @@ struct ImagesOnRecord {
 /// errors  kInput: several images a layer, or layers of several thicknesses
 Result<ImagesOnRecord> images_on_record(const std::string& path);
 
+/// The path of the manifest of a layer, DIR/layers/000042.tif, of whose directories the last one may be in a container.
+std::string manifest_of_layer(const std::string& image);
+
 /// Whether an image is a layer of a job whose manifest says that its grey is drops of a pixel. False where none says so.
 bool are_grey_drops(const std::string& image);
 

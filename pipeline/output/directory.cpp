@@ -13,6 +13,7 @@
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/kept_sections.h"
+#include "pipeline/output/paged_job.h"
 #include "pipeline/output/print_program.h"
 #include "stages/data/shortage.h"
 #include "stages/support/hash/hash.h"
@@ -111,7 +112,7 @@ Status check_output(const Job& job) {
                  fmt::format("{}/layers: contains layers {}; replace them with --overwrite, or name another directory",
                              job.output, found->begun ? "next to a manifest without a header" : "without a manifest")};
   }
-  return {};
+  return check_kind_of_output(job);
 }
 
 Status check_shard_fits(const Job& job, const ManifestHead& head) {
@@ -146,6 +147,18 @@ Result<Claim> claim_output(const Job& job, MadeFolders& made) {
   return claim;
 }
 
+Status remove_manifests(const Job& job) {
+  for (const ManifestFile& file : find_manifests(job.output)) {
+    if (joins(job, file) || file.name == part_of(manifest_name(job))) continue;  // the claim is in that name
+    const fs::path path = fs::path(job.output) / file.name;
+    std::error_code error;
+    remove_sections(path.string());
+    fs::remove(path, error);
+    if (error) return cannot(path, error.value());
+  }
+  return {};
+}
+
 Result<Claim> prepare_output(const Job& job, MadeFolders& made) {
   auto claim = claim_output(job, made);
   if (!claim) return claim.error();
@@ -173,12 +186,7 @@ Result<Claim> prepare_output(const Job& job, MadeFolders& made) {
     if (!job.shard) sweep_partial_files(job.output);
     return claim;
   }
-  for (const ManifestFile& file : find_manifests(job.output)) {
-    if (joins(job, file) || file.name == part_of(manifest_name(job))) continue;  // the claim is in that name
-    remove_sections(directory / file.name);
-    fs::remove(directory / file.name, error);
-    if (error) return cannot(directory / file.name, error.value());
-  }
+  if (Status status = remove_manifests(job); !status) return status.error();
   if (job.shard) return claim;
   if (Status status = remove_layers(job.output); !status) return status.error();
   if (job.machine.profile.empty()) fs::remove(directory / "program", error);  // fails if other files remain

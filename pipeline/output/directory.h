@@ -37,6 +37,9 @@ Result<bool> is_directory(const Job& job);
 /// while this one loaded its parts. errors  kUsage, kOutput
 Result<Claim> claim_output(const Job& job, MadeFolders& made);
 
+/// Removes the manifests of earlier jobs, but for those of other shards and the claimed one. errors  kOutput
+Status remove_manifests(const Job& job);
+
 /// Fails if a manifest in a shard's directory belongs to another job. Of its own: a shard keeps all other layers and cannot
 /// distinguish other shards' layers from an earlier job's, so the user must clear the directory. Of another shard: the two
 /// would never be merged.

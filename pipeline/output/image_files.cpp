@@ -69,17 +69,18 @@ ImageFiles::ImageFiles(const Plan& plan)
       head_(image_head(plan)),
       format_(formats::find_image_format(plan.job.format)),
       levels_(formats::find_level_format(plan.job.format)),
-      in_container_(plan.job.container == Container::kZip && !plan.job.dry_run) {
+      in_container_(plan.job.container == Container::kZip && !plan.job.dry_run),
+      in_pages_(plan.job.container == Container::kTiff && !plan.job.dry_run) {
   if (!plan.images->machine) return;
   program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
                    layer_file_options(plan.job), plan.job.compress_programs);
-  program_->in_memory = in_container_;
+  program_->in_memory = in_container_ || in_pages_;
 }
 
 Status ImageFiles::open() {
   const Job& job = plan_.job;
-  if (in_container_) {
-    if (Status status = open_container(); !status) return status;
+  if (in_container_ || in_pages_) {
+    if (Status status = in_container_ ? open_container() : open_pages(); !status) return status;
     return plan_.undecided ? Status() : start();
   }
   if (Status status = check_shard_fits(job, head_); !status) return status;
@@ -89,11 +90,7 @@ Status ImageFiles::open() {
   if (job.resume) {
     auto kept = layers_that_hold(job.output, job.output + "/" + manifest_name(job), head_);
     if (!kept) return kept.error();
-    if (job.quote && plan_.scene->images.empty()) {
-      if (Status status = check_shares_known(head_, *kept); !status) return status;
-    }
-    kept_ = std::move(*kept);
-    for (LayerRecord& record : kept_) report_unfed(record);
+    if (Status status = take_kept(std::move(*kept)); !status) return status;
   }
   if (!plan_.undecided && (!job.overwrite || job.shard)) {
     // Other shards have the other layers of the directory.
@@ -106,6 +103,15 @@ Status ImageFiles::open() {
   }
   claim_.emplace(std::move(*claim));
   return plan_.undecided ? Status() : start();
+}
+
+Status ImageFiles::take_kept(std::vector<LayerRecord> kept) {
+  if (plan_.job.quote && plan_.scene->images.empty()) {
+    if (Status status = check_shares_known(head_, kept); !status) return status;
+  }
+  kept_ = std::move(kept);
+  for (LayerRecord& record : kept_) report_unfed(record);
+  return {};
 }
 
 void ImageFiles::list_todo() {
@@ -127,6 +133,7 @@ Status ImageFiles::start() {
   head_.first_layer = plan_.range[0];
   head_.last_layer = plan_.range[1];
   if (in_container_) return start_container();
+  if (in_pages_) return start_pages();
   std::vector<std::string> folders{job.output + "/layers"};
   if (program_) folders.push_back(job.output + "/program");
   sync_ = FolderSync::of(folders);
@@ -205,6 +212,7 @@ Status ImageFiles::encode_one(const LayerImages& images, std::size_t number, Fil
 }
 
 Status ImageFiles::store(const LayerImages& images, FileWork& work, LayerRecord& record) const {
+  if (in_pages_) return program(images, work, record);
   if (in_container_) {
     if (Status status = program(images, work, record); !status) return status;
     work.sums.clear();
@@ -298,14 +306,24 @@ Status ImageFiles::record(const LayerRecord& record, const FileWork& work) {
     if (status) status = container_->flush(plan_.job.sync == Sync::kLayer);
     return status ? manifest_->append(record) : status;
   }
+  if (in_pages_) {
+    std::vector<StoredFile> files;
+    Status status = for_each_file(record, work, [&](const std::string& name, std::span<const std::byte> bytes) {
+      files.push_back({name, bytes});
+      return Status();
+    });
+    if (status) status = pages_->add(files, plan_.job.sync == Sync::kLayer);
+    return status ? manifest_->append(record) : status;
+  }
   Status status = manifest_->append(record);
   return status && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes + record.program.stored) : status;
 }
 
 Status ImageFiles::finish() {
-  if (kept_container_.finished) return {};
+  if (finished_) return {};
   if (Status status = record_kept_below(UINT32_MAX); !status) return status;
   if (in_container_) return finish_container();
+  if (in_pages_) return manifest_->finish({}, [this] { return pages_->finish(program_ ? &*program_ : nullptr); });
   // Once for layers and manifest: each wait for the disk takes some milliseconds.
   return manifest_->finish({}, [this] { return plan_.job.sync == Sync::kOff ? Status() : sync_->sync(); });
 }
@@ -329,11 +347,8 @@ Status ImageFiles::open_container() {
     auto kept = find_kept_container(job, head_);
     if (!kept) return kept.error();
     kept_container_ = std::move(*kept);
-    kept_ = kept_container_.layers;
-    if (job.quote && plan_.scene->images.empty()) {
-      if (Status status = check_shares_known(head_, kept_); !status) return status;
-    }
-    for (LayerRecord& record : kept_) report_unfed(record);
+    finished_ = kept_container_.finished;
+    if (Status status = take_kept(kept_container_.layers); !status) return status;
   }
   list_todo();
   claim_.emplace(std::move(*claim));
@@ -342,7 +357,7 @@ Status ImageFiles::open_container() {
 
 Status ImageFiles::start_container() {
   const Job& job = plan_.job;
-  if (kept_container_.finished) {  // a run that was killed at its very end may have left its begun manifest
+  if (finished_) {  // a run that was killed at its very end may have left its begun manifest
     remove_or_note(part_of(container_manifest(job)));
     return {};
   }
@@ -374,11 +389,51 @@ Status ImageFiles::finish_container() {
   });
 }
 
+bool ImageFiles::needs_big_pages() const {
+  // Group 4 (ITU-T T.6) takes at most 7 bits a pixel, PackBits and deflate an eighth more than the pixels.
+  const std::uint64_t pixels = std::uint64_t{head_.grid.columns()} * head_.grid.rows();
+  const std::uint64_t of_image = pixels / 8 * (levels_ == nullptr ? 7 : 9) + 16 * std::uint64_t{head_.grid.rows()} + 4096;
+  const std::uint64_t of_program = program_ ? program_->file_bound(std::max(1u, head_.max_drops)) : 0;
+  const std::uint64_t layers = plan_.range[1] - plan_.range[0] + 1;
+  return layers * std::max(of_image * std::max<std::size_t>(1, head_.named_images()), of_program) > UINT32_MAX;
+}
+
+Status ImageFiles::open_pages() {
+  auto claim = claim_paged_output(plan_.job, made_);
+  if (!claim) return claim.error();
+  if (plan_.job.resume) {
+    auto kept = find_kept_pages(plan_.job, head_, needs_big_pages());
+    if (!kept) return kept.error();
+    kept_pages_ = std::move(*kept);
+    finished_ = kept_pages_.finished;
+    if (Status status = take_kept(kept_pages_.layers); !status) return status;
+  }
+  list_todo();
+  claim_.emplace(std::move(*claim));
+  return {};
+}
+
+Status ImageFiles::start_pages() {
+  const Job& job = plan_.job;
+  if (finished_) return {};
+  const bool at_once = job.sync != Sync::kJob || !kept_.empty();
+  auto manifest =
+      ManifestWriter::open(job.output + "/" + manifest_name(job), head_, kept_, {job.sync, at_once, {}}, std::move(*claim_));
+  if (!manifest) return manifest.error();
+  manifest_.emplace(std::move(*manifest));
+  claim_.reset();
+  auto pages = PagedJob::open(job, head_, needs_big_pages(), kept_pages_, program_ ? &*program_ : nullptr);
+  if (!pages) return pages.error();
+  pages_.emplace(std::move(*pages));
+  return {};
+}
+
 Status ImageFiles::keep() { return manifest_ ? manifest_->flush() : Status(); }
 
 void ImageFiles::discard() {
   if (manifest_) manifest_->discard();
   if (container_) container_->discard();
+  if (pages_) pages_->discard();
   if (in_container_) return made_.take_back();
   if (!remove_layers(plan_.job.output)) return;
   for (const char* folder : {"layers", "program"}) {

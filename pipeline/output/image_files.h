@@ -13,6 +13,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/job_container.h"
+#include "pipeline/output/paged_job.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/bit_image.h"
@@ -52,7 +53,7 @@ class ImageFiles {
   Status open();
   /// Starts the manifest of a plan whose layers are decided since open(). errors  kOutput
   Status start();
-  bool started() const { return manifest_.has_value() || kept_container_.finished; }
+  bool started() const { return manifest_.has_value() || finished_; }
   /// Layers still to be made, in increasing order; valid after opening.
   std::vector<std::uint32_t> take_todo() { return std::move(todo_); }
   /// Layers kept from an interrupted run.
@@ -86,8 +87,10 @@ class ImageFiles {
   /// In layer order; kept layers are recorded in their place. work  of store(); needed by a container alone
   Status record(const LayerRecord& record, const FileWork& work);
   /// Whether record() needs the work.
-  bool records_from_work() const { return in_container_; }
-  /// The text of inspection.json, before the end of a container.
+  bool records_from_work() const { return in_container_ || in_pages_; }
+  /// Whether the output is one file, with inspection.json in it.
+  bool is_one_file() const { return in_container_; }
+  /// The text of inspection.json, before the end of such a file.
   void set_inspection(std::string text) { inspection_ = std::move(text); }
   Status finish();
   /// Ends an interrupted or failed job; its finished layers stay recorded.
@@ -102,6 +105,11 @@ class ImageFiles {
   Status open_container();
   Status start_container();
   Status finish_container();
+  Status open_pages();
+  Status start_pages();
+  /// Whether the pages, or offsets of the program, may exceed 4 GiB. The same for all runs of the job.
+  bool needs_big_pages() const;
+  Status take_kept(std::vector<LayerRecord> kept);
   void list_todo();
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
@@ -118,9 +126,12 @@ class ImageFiles {
   std::optional<Claim> claim_;  // until the manifest is started
   std::optional<ManifestWriter> manifest_;
   std::optional<FolderSync> sync_;
-  bool in_container_;
+  bool in_container_, in_pages_;
+  bool finished_ = false;  // of a container or of pages: nothing is to be written
   KeptContainer kept_container_;
   std::optional<JobContainer> container_;
+  KeptPages kept_pages_;
+  std::optional<PagedJob> pages_;
   std::string inspection_;
   std::vector<std::uint32_t> todo_;
   std::vector<LayerRecord> kept_;

@@ -35,15 +35,6 @@ std::vector<std::string> names_up_to(const ManifestHead& head, std::span<const L
   return names;
 }
 
-/// Whether the files next to those of layers are what the job writes. end  the last one too
-bool frame_holds(const std::string& container, const ManifestHead& head, bool end) {
-  if (head.machine.empty()) return true;
-  const std::string& extension = head.program_extension;
-  return fault_of_file(container, "program/machine.toml", head.machine_profile).empty() &&
-         fault_of_file(container, "program/start" + extension, head.program_start).empty() &&
-         (!end || fault_of_file(container, "program/end" + extension, head.program_end).empty());
-}
-
 /// How many entries, from the first on, have the CRC that unpackers check.
 std::size_t count_with_sums(const std::string& container, std::span<const ContainerEntry> entries) {
   std::vector<char> holds(entries.size());
@@ -55,7 +46,7 @@ std::size_t count_with_sums(const std::string& container, std::span<const Contai
 /// What of the begun container is kept: layers without a gap from the first on, whose entries come in the order of the job.
 Result<KeptContainer> kept_of_begun(const std::string& part, const ManifestHead& head, std::vector<LayerRecord> layers) {
   KeptContainer kept;
-  if (layers.empty() || !frame_holds(part, head, false)) return kept;
+  if (layers.empty() || !has_program_frame(part, head, false)) return kept;
   std::size_t count = 0;
   while (count < layers.size() && layers[count].layer.index == head.first_layer + count) ++count;
   layers.resize(count);
@@ -92,6 +83,14 @@ Status check_part_is_ours(const Job& job) {
 }  // namespace
 
 std::string container_manifest(const Job& job) { return job.output + ".json"; }
+
+bool has_program_frame(const std::string& output, const ManifestHead& head, bool end) {
+  if (head.machine.empty()) return true;
+  const std::string& extension = head.program_extension;
+  return fault_of_file(output, "program/machine.toml", head.machine_profile).empty() &&
+         fault_of_file(output, "program/start" + extension, head.program_start).empty() &&
+         (!end || fault_of_file(output, "program/end" + extension, head.program_end).empty());
+}
 
 Status check_container(const Job& job) {
   std::error_code error;
@@ -145,7 +144,7 @@ Result<KeptContainer> find_kept_container(const Job& job, const ManifestHead& he
   if (!layers) return layers.error();
   const auto entries = read_entries(job.output);
   if (!entries) return entries.error();
-  kept.finished = layers->size() == head.last_layer - head.first_layer && frame_holds(job.output, head, true) &&
+  kept.finished = layers->size() == head.last_layer - head.first_layer && has_program_frame(job.output, head, true) &&
                   count_with_sums(job.output, *entries) == entries->size() &&
                   (!job.inspect || read_inspection(job.output, head));
   if (kept.finished) kept.layers = std::move(*layers);

@@ -26,6 +26,9 @@ namespace lamina::pipeline {
 /// The name that the begun manifest of a container would get: it grows as its .part, and ends as the last entry.
 std::string container_manifest(const Job& job);
 
+/// Whether the files of the program next to those of layers are what the job writes. end  the last one too
+bool has_program_frame(const std::string& output, const ManifestHead& head, bool end);
+
 /// Checks that a job may write its container. Changes nothing.
 /// errors  kUsage: a job is there, without --resume or --overwrite, or somebody else's NAME.part; kOutput: a directory, or
 ///         another run writes it

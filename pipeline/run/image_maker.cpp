@@ -145,7 +145,7 @@ class ImageMaker : public Maker {
     std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
     std::iota(all.begin(), all.end(), plan_.range[0]);
     if (plan_.job.dry_run) return all;
-    const bool has_directory = !files_.records_from_work();
+    const bool has_directory = !files_.is_one_file();
     if (Status status = has_directory ? inspector_->check_file() : Status(); !status) return status.error();
     if (Status status = files_.open(); !status) return status.error();
     if (Status status = has_directory ? inspector_->open(files_.head()) : Status(); !status) return status.error();
@@ -267,9 +267,9 @@ class ImageMaker : public Maker {
   Status finish() override {
     if (plan_.job.dry_run) return {};
     if (Status status = inspector_->finish(); !status) return status;
-    if (files_.records_from_work() && inspector_->on()) files_.set_inspection(inspector_->text(files_.head()));
+    if (files_.is_one_file() && inspector_->on()) files_.set_inspection(inspector_->text(files_.head()));
     const Status status = files_.finish();
-    return status && !files_.records_from_work() ? inspector_->write(files_.head()) : status;
+    return status && !files_.is_one_file() ? inspector_->write(files_.head()) : status;
   }
   Status stop(bool keep) override {
     if (!plan_.job.dry_run && keep) return files_.keep();

@@ -23,6 +23,7 @@
 #include "stages/support/io/container.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {
@@ -146,6 +147,8 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
 /// Never replaces files of another job, nor of none: a merge that was killed left its begun manifest.
 /// returns  whether a finished manifest says so, of a shard or of all
 Result<bool> check_output(const std::string& output, const ManifestHead& head, const Claim& claim) {
+  if (const std::string pages = pages_path(output); !pages.empty())
+    return usage("{}: is of a job with --container tiff, into which nothing is merged; name another directory with -o", pages);
   bool known = false, finished = false;
   for (const ManifestFile& file : find_manifests(output)) {
     const std::string path = (fs::path(output) / file.name).string();

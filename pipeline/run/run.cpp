@@ -31,7 +31,7 @@ namespace {
 Status check_output_of(const Resolved& resolved) {
   switch (resolved.product) {
     case Product::kImages:
-      return resolved.job.container == Container::kNone ? check_output(resolved.job) : check_container(resolved.job);
+      return resolved.job.container == Container::kZip ? check_container(resolved.job) : check_output(resolved.job);
     case Product::kContours: return check_slice_output(resolved.job);
     case Product::kMoves: return check_toolpath_output(resolved.job, resolved.extruder->machine);
   }

@@ -8,6 +8,7 @@
 #include "pipeline/manifest/layer_files.h"
 #include "pipeline/output/image_files.h"
 #include "pipeline/run/layer_imager.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -28,7 +29,14 @@ std::uint64_t bits_of_images(const ManifestHead& head) {
 std::uint64_t bytes_there(const Job& job) {
   if ((!job.resume && !job.overwrite) || job.shard) return 0;
   std::uint64_t bytes = 0;
-  if (job.container != Container::kNone) {  // a finished one is replaced at the end
+  const std::vector<std::string> paged = paged_job_files(job.output);
+  for (const std::string& file : paged) {
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(file, error);
+    bytes += error ? 0 : size;
+  }
+  if (!paged.empty()) return bytes;
+  if (job.container == Container::kZip) {  // a finished one is replaced at the end
     std::error_code error;
     const std::uintmax_t size = fs::file_size(job.output + ".part", error);
     return error ? 0 : size;

@@ -15,7 +15,7 @@ constexpr unsigned bit(Product product) { return 1u << static_cast<unsigned>(pro
 enum class Sync : std::uint8_t { kOff, kJob, kLayer };
 
 /// The files of a job: in a directory, or all in one ZIP file.
-enum class Container : std::uint8_t { kNone, kZip };
+enum class Container : std::uint8_t { kNone, kZip, kTiff };
 
 /// The widest instructions that kernels use; auto: the processor's. The bytes are the same.
 enum class Isa : std::uint8_t { kAuto, kPlain, kAvx2, kAvx512 };

@@ -8,6 +8,7 @@
 
 #include "stages/data/levels.h"
 #include "stages/formats/image_format.h"
+#include "stages/formats/tiff/pages.h"
 #include "tests/formats/images.h"
 
 namespace lamina::formats {
@@ -65,6 +66,39 @@ TEST(OpenImageIO, SeesBlackExactlyWhereRunsAreInEveryFormat) {
       EXPECT_NEAR(dpi[0], 1200, 0.02);
       EXPECT_NEAR(dpi[1], 600, 0.02);
     }
+  }
+}
+
+TEST(OpenImageIO, ReadsThePagesOfAJobLikeTheFilesInThem) {
+  const testing::Folder folder;
+  for (const bool big : {false, true}) {
+    const std::string path = folder / "layers.tif";
+    std::vector<std::string> singles;
+    {
+      auto file = File::open(path, {.replace = true});
+      ASSERT_TRUE(file.ok());
+      tiff::PageWriter writer(*file, big);
+      for (const ImageFormat* format : testing::file_formats()) {
+        if (format->extension != ".tif") continue;
+        const Bytes bytes = testing::encoded(*format, testing::random_image(1000, 1000, 60), 1200, 600);
+        const auto single = std::as_bytes(std::span(bytes));
+        singles.push_back(folder / (std::to_string(singles.size()) + ".tif"));
+        testing::save(singles.back(), bytes);
+        ASSERT_TRUE(writer.add({"layers/" + std::to_string(singles.size()) + ".tif", {}, single.size()}, single).ok());
+      }
+      ASSERT_TRUE(writer.finish().ok() && file->finish().ok());
+    }
+    const auto pages = OIIO::ImageInput::open(path);
+    ASSERT_TRUE(pages) << OIIO::geterror();
+    for (std::size_t i = 0; i < singles.size(); ++i) {
+      const auto single = OIIO::ImageInput::open(singles[i]);
+      ASSERT_TRUE(single && pages->seek_subimage(static_cast<int>(i), 0)) << pages->geterror();
+      std::vector<std::uint8_t> expected(single->spec().image_pixels()), found(pages->spec().image_pixels());
+      ASSERT_TRUE(single->read_image(0, 0, 0, 1, OIIO::TypeDesc::UINT8, expected.data()));
+      ASSERT_TRUE(pages->read_image(static_cast<int>(i), 0, 0, 1, OIIO::TypeDesc::UINT8, found.data())) << pages->geterror();
+      EXPECT_TRUE(found == expected) << "page " << i;
+    }
+    EXPECT_FALSE(pages->seek_subimage(static_cast<int>(singles.size()), 0)) << "no more pages";
   }
 }
 

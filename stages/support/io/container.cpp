@@ -14,10 +14,12 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string_view>
 #include <utility>
+
+#include "stages/support/io/paged.h"
+#include "stages/support/io/recent_files.h"
 
 namespace lamina {
 namespace {
@@ -196,16 +198,12 @@ bool begins_like_container(int file, std::uint64_t bytes) {
 
 bool is_unfinished(std::string_view path) { return path.ends_with(".part"); }
 
-/// The entries of a container by their names, as long as its file is the same.
+/// The entries of a container by their names.
 struct Index {
   struct stat stamp {};
   std::vector<ContainerEntry> entries;  // sorted by name
   std::string fault;
 
-  bool is_of(const struct stat& now) const {
-    return now.st_dev == stamp.st_dev && now.st_ino == stamp.st_ino && now.st_size == stamp.st_size &&
-           now.st_mtim.tv_sec == stamp.st_mtim.tv_sec && now.st_mtim.tv_nsec == stamp.st_mtim.tv_nsec;
-  }
   /// manifest.json, or manifest-2-of-5.json
   bool has_manifest() const {
     const auto at = std::ranges::lower_bound(entries, kOfShard, {}, &ContainerEntry::name);
@@ -225,36 +223,15 @@ std::string read_index(int file, std::string_view path, std::uint64_t bytes, std
   return {};
 }
 
-/// The indexes of the containers that were read last.
-class Indexes {
- public:
-  std::shared_ptr<const Index> of(const std::string& path, int file, const struct stat& now) {
-    const std::lock_guard lock(mutex_);
-    for (auto& [name, index] : recent_) {
-      if (name == path && index->is_of(now)) return index;
-    }
-    auto made = std::make_shared<Index>();
-    made->stamp = now;
-    std::uint64_t end = 0;
-    made->fault = read_index(file, path, static_cast<std::uint64_t>(now.st_size), made->entries, end);
-    std::ranges::sort(made->entries, {}, &ContainerEntry::name);
-    const auto twice = std::ranges::adjacent_find(made->entries, {}, &ContainerEntry::name);
-    if (twice != made->entries.end() && made->fault.empty()) made->fault = twice->name + " occurs twice";
-    std::erase_if(recent_, [&](const auto& one) { return one.first == path; });
-    if (recent_.size() >= kRecent) recent_.erase(recent_.begin());
-    recent_.emplace_back(path, made);
-    return made;
-  }
-
- private:
-  static constexpr std::size_t kRecent = 8;
-  std::mutex mutex_;
-  std::vector<std::pair<std::string, std::shared_ptr<const Index>>> recent_;  // the latest last
-};
-
 std::shared_ptr<const Index> index_of(const std::string& path, int file, const struct stat& now) {
-  static Indexes indexes;
-  return indexes.of(path, file, now);
+  static RecentFiles<Index> recent;
+  return recent.of(path, now, [&](Index& index) {
+    std::uint64_t end = 0;
+    index.fault = read_index(file, path, static_cast<std::uint64_t>(now.st_size), index.entries, end);
+    std::ranges::sort(index.entries, {}, &ContainerEntry::name);
+    const auto twice = std::ranges::adjacent_find(index.entries, {}, &ContainerEntry::name);
+    if (twice != index.entries.end() && index.fault.empty()) index.fault = twice->name + " occurs twice";
+  });
 }
 
 /// A container that is open, and the rest of a path that leads through it; without an index if it leads through none.
@@ -330,6 +307,7 @@ bool is_job_folder(const std::string& path) {
 }
 
 OpenedEntry open_entry(const std::string& path) {
+  if (auto paged = open_in_pages(path)) return std::move(*paged);
   Through through = open_through(path);
   if (through.index && !through.index->fault.empty()) return {-1, 0, 0, through.index->fault};
   const ContainerEntry* entry = through.index ? through.index->find(through.inside) : nullptr;
@@ -379,6 +357,7 @@ bool has_its_sum(const std::string& container, const ContainerEntry& entry) {
 }
 
 std::optional<std::uint64_t> entry_bytes(const std::string& path) {
+  if (const auto paged = bytes_in_pages(path)) return paged;
   const Through through = open_through(path);
   const ContainerEntry* entry = through.index ? through.index->find(through.inside) : nullptr;
   return entry != nullptr ? std::optional(entry->bytes) : std::nullopt;
@@ -394,7 +373,7 @@ std::vector<std::string> names_in_folder(const std::string& folder) {
   }
   auto [outer, inside] = fs::is_regular_file(folder, error) ? std::pair(folder, std::string()) : split(folder);
   const Through through = open_container(outer, std::move(inside));
-  if (!through.index) return names;
+  if (!through.index) return names_in_pages(folder);
   const std::string below = through.inside.empty() ? std::string() : through.inside + "/";
   for (const ContainerEntry& entry : through.index->entries) {
     if (!entry.name.starts_with(below)) continue;

@@ -38,7 +38,8 @@ struct OpenedEntry {
   std::uint64_t offset = 0, bytes = 0;
   std::string fault;  // of the container; "": errno states why there is no descriptor, ENOENT for no such entry
 };
-/// Opens manifests, inspection.json, and what is in layers/ or program/; other entries are no files of a job.
+/// Opens manifests, inspection.json, and what is in layers/ or program/; other entries are no files of a job. Also of a file in
+/// the pages of a job (paged.h).
 /// cost  the entries are read again only once the container has changed
 OpenedEntry open_entry(const std::string& path);
 
@@ -48,10 +49,10 @@ int copy_range(int file, std::uint64_t offset, std::uint64_t bytes);
 /// Whether the CRC-32 of the bytes is that of the entry, as unpackers check it. cost  reads the entry
 bool has_its_sum(const std::string& container, const ContainerEntry& entry);
 
-/// Whether a path leads through a container to an entry; its size. cost  some system calls
+/// Whether a path leads through a container, or through the pages of a job, to an entry; its size. cost  some system calls
 std::optional<std::uint64_t> entry_bytes(const std::string& path);
 
-/// The names in a folder, of a directory or a container, without order; empty if there is none. Of a container files alone.
+/// The names in a folder, of a directory, a container or the pages of a job, without order; empty if there is none. Of a container files alone.
 std::vector<std::string> names_in_folder(const std::string& folder);
 
 }  // namespace lamina

@@ -19,6 +19,7 @@
 #include "stages/data/shortage.h"
 #include "stages/support/io/container.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/io/paged.h"
 #include "stages/support/io/rename.h"
 #include "stages/support/io/sync.h"
 #include "stages/support/io/temporary.h"
@@ -392,7 +393,7 @@ bool same_file(const std::string& a, const std::string& b) {
 bool is_file(const std::string& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) == 0) return S_ISREG(status.st_mode);
-  return errno == ENOTDIR && entry_bytes(path).has_value();
+  return (errno == ENOTDIR || (errno == ENOENT && is_page_name(path))) && entry_bytes(path).has_value();
 }
 
 bool is_stream(const std::string& path) {

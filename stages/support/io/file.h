@@ -136,7 +136,7 @@ std::optional<FileStamp> file_stamp(const std::string& path);
 /// Whether two names lead to the same file or directory, by device and inode; false if one of them is absent.
 bool same_file(const std::string& a, const std::string& b);
 
-/// Whether the name leads to a regular file, or through a container to an entry.
+/// Whether the name leads to a regular file, or through a container or the pages of a job to one of their files.
 bool is_file(const std::string& path);
 
 /// Whether the name leads to a device, a pipe or a socket, or is "-", standard output.

@@ -13,6 +13,7 @@
 
 #include "stages/data/shortage.h"
 #include "stages/support/io/container.h"
+#include "stages/support/io/paged.h"
 
 namespace lamina {
 namespace {
@@ -140,7 +141,7 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
     // Without O_NONBLOCK, opening a pipe without a writer would wait for ever.
     state->file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
   }
-  if (state->file < 0 && errno == ENOTDIR) {
+  if (state->file < 0 && (errno == ENOTDIR || (errno == ENOENT && is_page_name(path)))) {
     const OpenedEntry found = open_entry(path);
     if (!found.fault.empty()) return state->error(found.fault);
     state->file = found.file;
