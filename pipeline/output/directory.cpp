@@ -247,7 +247,7 @@ FileOptions layer_file_options(const Job& job) {
 Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& finished,
                                                   const ManifestHead& head) {
   std::string path = finished;
-  if (!is_file(path)) {
+  if (std::error_code error; !is_file(path) && !fs::exists(path, error)) {
     path += ".part";
     if (!has_manifest_head(path)) return std::vector<LayerRecord>{};
   }
