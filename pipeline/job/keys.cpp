@@ -501,7 +501,7 @@ const JobKey kRunKeys[] = {
     word<kSyncs, &Job::sync>(
         {"run", "sync", "--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off"}),
     word<kContainers, &Job::container>(
-        {"run", "container", "--container", "KIND", "zip: one ZIP file, -o FILE.zip; tiff: layers as pages; none"}),
+        {"run", "container", "--container", "KIND", "few files: zip (one ZIP file), tiff (one multi-page TIFF)"}),
     custom<Job, read_pair<read_layer_range>, write_layers, &Job::layers>(
         {"run", "layers", "--layers", "A:B", "plan layers A to B - 1 only, from 0 at the bottom; also A: and :B"},
         Form::kString),

@@ -137,7 +137,7 @@ Result<KeptContainer> find_kept_container(const Job& job, const ManifestHead& he
   KeptContainer kept;
   if (!is_file(job.output)) return kept;
   if (!is_file(job.output + "/" + manifest_name(job)))
-    return usage("{}: contains no {}, as this job does; name another file with -o, or replace it with --overwrite", job.output,
+    return usage("{}: contains no {} of this job; name another file with -o, or replace it with --overwrite", job.output,
                  manifest_name(job));
   kept.replaces = true;
   auto layers = layers_that_hold(job.output, job.output + "/" + manifest_name(job), head);

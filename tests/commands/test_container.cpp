@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -55,6 +56,10 @@ TEST_F(Containers, HaveTheFilesOfADirectory) {
     lamina(job + " -o out --quiet");
     lamina(job + " -o out --container zip --quiet");
     expect_files_of("out.zip", "out");
+    const std::string unpack = "cd '" + directory_.path().string() + "' && python3 -m zipfile -e out.zip unpacked";
+    ASSERT_EQ(std::system(unpack.c_str()), 0) << "Python checks the sums";
+    EXPECT_TRUE(tree_text(directory_ / "unpacked") == tree_text(directory_ / "out")) << job;
+    fs::remove_all(directory_ / "unpacked");
     lamina(job + " -o other.zip --container zip --threads 1 --sync layer --quiet");
     EXPECT_TRUE(text("out.zip") == text("other.zip")) << job;
     fs::remove_all(directory_ / "out");

@@ -52,7 +52,7 @@ CommandSpec batch_spec() {
       {"--jobs", "N", "max number of concurrent jobs; 0: one per processor", "0", "Run"},
       {"--memory", "SIZE", "memory limit of all running jobs: 512M, 4G", "1G", "Run"},
       {"--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off", "job", "Run", sync->words()},
-      {"--container", "KIND", "zip, tiff: for each job of images that names none", "none", "Run", {"none", "zip", "tiff"}},
+      {"--container", "KIND", "--container of jobs of images that set none: zip, tiff", "none", "Run", {"none", "zip", "tiff"}},
       {"--cache", "FOLDER", "take the files of equal jobs from a cache, or add them", "", "Run"},
       {"--cache-link", "", "make read-only hard links to the cache, no copies", "", "Run"},
       {"--time-limit", "SECONDS", "time limit per job in seconds; slower jobs fail with exit code 3", "", "Run"},
