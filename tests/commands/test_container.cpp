@@ -150,6 +150,15 @@ TEST_F(Containers, ShardsAreMergedIntoADirectoryOrAContainer) {
   EXPECT_TRUE(text("merged.zip") == text("whole.zip"));
   EXPECT_NE(lamina("merge s1.zip s3.zip -o gap.zip", 5).err.find("are in no shard"), std::string::npos);
   EXPECT_FALSE(fs::exists(directory_ / "gap.zip"));
+  // A byte of a shard that changed is not carried into the whole job.
+  const auto entries = read_entries(directory_ / "s2.zip");
+  ASSERT_TRUE(entries.ok());
+  const ContainerEntry& entry = (*entries)[4];
+  std::string damaged = text("s2.zip");
+  damaged[entry.header + 30 + entry.name.size() + entry.bytes / 2] ^= 1;
+  write_text(directory_ / "s2.zip", damaged);
+  EXPECT_NE(lamina("merge s1.zip s2.zip s3.zip -o damaged.zip", 5).err.find(entry.name), std::string::npos);
+  EXPECT_FALSE(fs::exists(directory_ / "damaged.zip"));
 }
 
 TEST_F(Containers, ABatchWritesAFileForEachJob) {
