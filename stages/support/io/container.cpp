@@ -112,6 +112,9 @@ std::optional<EntryHead> read_head(int file, std::uint64_t offset, std::uint64_t
   return found;
 }
 
+/// Whether an entry is a folder, as other programs write.
+bool is_folder(const ContainerEntry& entry) { return entry.name.ends_with('/'); }
+
 /// The whole entries of a file without a directory.
 std::vector<ContainerEntry> walk(int file, std::uint64_t file_bytes, std::uint64_t& end) {
   std::vector<ContainerEntry> entries;
@@ -119,7 +122,7 @@ std::vector<ContainerEntry> walk(int file, std::uint64_t file_bytes, std::uint64
   while (auto head = read_head(file, end, file_bytes)) {
     if (!head->stored) break;
     end = head->data + head->packed;
-    entries.push_back(std::move(head->entry));
+    if (!is_folder(head->entry)) entries.push_back(std::move(head->entry));
   }
   return entries;
 }
@@ -171,7 +174,7 @@ std::string read_directory(int file, std::uint64_t file_bytes, std::vector<Conta
     if (!widen(rest.substr(kDirectoryHead + name, extra), std::array{&entry.bytes, &packed, &entry.header}))
       return "its directory is damaged";
     const std::size_t next = kDirectoryHead + name + extra + comment;
-    if (entry.name.ends_with('/')) {  // a folder of another program
+    if (is_folder(entry)) {
       rest.remove_prefix(next);
       continue;
     }
