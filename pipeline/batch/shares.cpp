@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <numeric>
 #include <queue>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -32,21 +33,33 @@ constexpr std::string_view kFirstLine = "lamina shares\t2\n", kColumns = "job\ts
 constexpr std::uint64_t kStartBytes = 64 << 10;  // what it costs to start a job, in bytes of a part
 constexpr std::uint64_t kMaxShares = 1'000'000;  // of read_shard()
 
+/// Cost of loading each part.
+using Loads = std::map<Hash128, std::uint64_t, HashOrder>;
+
+Loads loads_of(std::span<const CostedJob> jobs) {
+  Loads loads;
+  for (const CostedJob& job : jobs) loads[job.part] = std::max(loads[job.part], job.load);
+  return loads;
+}
+
 /// Jobs of one part, or some of them.
 struct Piece {
-  std::uint64_t cost = 0;
-  std::vector<std::uint32_t> jobs;  // indices
+  Hash128 part;
+  std::uint64_t load = 0, cost = 0;  // cost: without the load
+  std::vector<std::uint32_t> jobs;   // indices
+
+  std::uint64_t whole() const { return load + cost; }
 };
 
 /// Cuts the jobs of each part into pieces of at most `limit`, or of one job.
-std::vector<Piece> cut_pieces(std::span<const CostedJob> jobs, double limit) {
+std::vector<Piece> cut_pieces(std::span<const CostedJob> jobs, const Loads& loads, double limit) {
   std::vector<Piece> pieces;
   std::map<Hash128, std::size_t, HashOrder> open;  // the piece of each part that grows
   for (std::uint32_t i = 0; i < jobs.size(); ++i) {
     const auto [found, is_new] = open.try_emplace(jobs[i].part, pieces.size());
-    if (is_new || static_cast<double>(pieces[found->second].cost + jobs[i].cost) > limit) {
+    if (is_new || static_cast<double>(pieces[found->second].whole() + jobs[i].cost) > limit) {
       found->second = pieces.size();
-      pieces.emplace_back();
+      pieces.push_back({jobs[i].part, loads.at(jobs[i].part), 0, {}});
     }
     Piece& piece = pieces[found->second];
     piece.cost += jobs[i].cost;
@@ -54,6 +67,48 @@ std::vector<Piece> cut_pieces(std::span<const CostedJob> jobs, double limit) {
   }
   return pieces;
 }
+
+/// Shares to which pieces are given, and their costs.
+class Shares {
+ public:
+  explicit Shares(std::uint32_t count) : sums_(count) {
+    for (std::uint32_t share = 0; share < count; ++share) all_.emplace(0, share);
+  }
+
+  /// Where the piece ends first: in the smallest share, or in the smallest of those that load its part anyway.
+  std::uint32_t give(const Piece& piece) {
+    Heap& having = having_[piece.part];
+    const std::uint32_t share = smallest(all_);
+    if (!having.empty()) {
+      const std::uint32_t other = smallest(having);
+      if (sums_[other] <= sums_[share] + piece.load) {
+        sums_[other] += piece.cost;
+        return other;
+      }
+    }
+    sums_[share] += piece.whole();
+    if (piece.load > 0) having.emplace(sums_[share], share);
+    return share;
+  }
+
+ private:
+  using Sum = std::pair<std::uint64_t, std::uint32_t>;  // cost when it was added, share
+  using Heap = std::priority_queue<Sum, std::vector<Sum>, std::greater<>>;
+
+  /// Costs only grow, so that what is outdated is found at the top.
+  std::uint32_t smallest(Heap& heap) const {
+    while (heap.top().first != sums_[heap.top().second]) {
+      const std::uint32_t share = heap.top().second;
+      heap.pop();
+      heap.emplace(sums_[share], share);
+    }
+    return heap.top().second;
+  }
+
+  std::vector<std::uint64_t> sums_;
+  Heap all_;
+  std::map<Hash128, Heap, HashOrder> having_;  // a part's shares
+};
 
 Error damaged_plan(const std::string& path) {
   return failure(Fault::kVerification,
@@ -185,20 +240,23 @@ CostedJob FileCosts::of(const Call& call) {
   return result;
 }
 
-std::vector<std::uint32_t> divide_jobs(std::span<const CostedJob> jobs, std::uint32_t shares) {
-  const auto add = [](std::uint64_t sum, const CostedJob& job) { return sum + job.cost; };
-  const auto total = static_cast<double>(std::accumulate(jobs.begin(), jobs.end(), std::uint64_t{0}, add));
-  std::vector<Piece> pieces = cut_pieces(jobs, 0.05 * total / shares);
-  std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
-  std::vector<std::uint32_t> result(jobs.size());
-  using Sum = std::pair<std::uint64_t, std::uint32_t>;  // cost, share
-  std::priority_queue<Sum, std::vector<Sum>, std::greater<>> sums;
-  for (std::uint32_t share = 1; share <= shares; ++share) sums.emplace(0, share);
+std::vector<DividedJob> divide_jobs(std::span<const CostedJob> jobs, std::uint32_t shares) {
+  const Loads loads = loads_of(jobs);
+  double total = 0;
+  for (const CostedJob& job : jobs) total += static_cast<double>(job.cost);
+  for (const auto& [part, load] : loads) total += static_cast<double>(load);
+  std::vector<Piece> pieces = cut_pieces(jobs, loads, 0.05 * total / shares);
+  std::ranges::stable_sort(pieces, std::greater<>(), &Piece::whole);
+  std::vector<DividedJob> result(jobs.size());
+  Shares sums(shares);
   for (const Piece& piece : pieces) {
-    const auto [sum, share] = sums.top();
-    sums.pop();
-    sums.emplace(sum + piece.cost, share);
-    for (const std::uint32_t job : piece.jobs) result[job] = share;
+    const std::uint32_t share = sums.give(piece);
+    for (const std::uint32_t job : piece.jobs) result[job] = {share + 1, jobs[job].cost};
+  }
+  std::map<Hash128, std::set<std::uint32_t>, HashOrder> loaded;  // the shares of each part
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    if (!loaded[jobs[i].part].insert(result[i].share).second) continue;
+    result[i].cost = std::min(result[i].cost + loads.at(jobs[i].part), kMaxJobCost);
   }
   return result;
 }
@@ -214,10 +272,10 @@ Hash128 words_hash(const BatchJob& job) { return hash_text(fmt::format("{}\n{}",
 SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
                       const std::vector<std::string>& with, std::string_view unit) {
   SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), {}, {}};
-  const std::vector<std::uint32_t> share_of = divide_jobs(costs, shares);
+  const std::vector<DividedJob> divided = divide_jobs(costs, shares);
   plan.jobs.reserve(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i)
-    plan.jobs.push_back({share_of[i], costs[i].cost, words_hash(jobs[i]), table_cell(jobs[i].entry.source)});
+    plan.jobs.push_back({divided[i].share, divided[i].cost, words_hash(jobs[i]), table_cell(jobs[i].entry.source)});
   return plan;
 }
 

@@ -19,8 +19,9 @@ namespace lamina::pipeline {
 
 /// What the division reads of a job.
 struct CostedJob {
-  std::uint64_t cost = 1;  // in any unit, 1 to kMaxJobCost
+  std::uint64_t cost = 1;  // in any unit, 1 to kMaxJobCost; without `load`
   Hash128 part;            // of the path of its first part file; zero without one
+  std::uint64_t load = 0;  // of that part: once in each share that has jobs of the part. The largest of its jobs counts
 };
 inline constexpr std::uint64_t kMaxJobCost = std::uint64_t{1} << 40;
 
@@ -34,10 +35,17 @@ class FileCosts {
   std::map<Hash128, std::uint64_t, HashOrder> known_;  // bytes by the names of files
 };
 
-/// The share of each job, from 1. Jobs of one part are cut, in order, into pieces of at most 5 % of a mean share. The dearest
-/// piece goes to the share with the smallest sum, the lower number first. If no job costs more than 5 % of a mean share, no
+/// A share of a job, from 1, and what the job costs there: the first one of its part has the cost of loading it.
+struct DividedJob {
+  std::uint32_t share = 0;
+  std::uint64_t cost = 0;
+  bool operator==(const DividedJob&) const = default;
+};
+
+/// Jobs of one part are cut, in order, into pieces of at most 5 % of a mean share, loading included. The dearest piece goes to
+/// the share with the smallest sum, the lower number first. If no job costs more than 5 % of a mean share with its load, no
 /// share costs more than 1.05 times the mean.
-std::vector<std::uint32_t> divide_jobs(std::span<const CostedJob> jobs, std::uint32_t shares);
+std::vector<DividedJob> divide_jobs(std::span<const CostedJob> jobs, std::uint32_t shares);
 
 inline constexpr std::string_view kPlannedUnit = "microseconds";  // of costs by dry runs
 

@@ -3,15 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
+#include <memory>
+#include <optional>
+#include <set>
 #include <utility>
 
 #include "pipeline/batch/record.h"
 #include "pipeline/batch/shares.h"
 #include "pipeline/cli/job_call.h"
 #include "pipeline/job/errors.h"
+#include "stages/load/part_store.h"
+#include "stages/support/clocks.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -37,65 +41,86 @@ std::vector<std::string> without_output(const std::vector<std::string>& words) {
   return kept;
 }
 
-/// Seconds of the layers of a job on one processor, from the summary of its dry run: a sum of what layers, and pixels or area
-/// take. The factors were fitted to jobs of shared/models within a factor of 3 (bench/shares.md); shares need their ratios
-/// only. 0: the summary is not that of a job with parts
+/// Processor seconds of the layers that a dry run has not made, from its summary. 0: it made them, or is of a job without
+/// parts. What it takes to open and close the file of a layer is included as measured on Linux.
 double estimate_seconds(const Json& summary) try {
-  const auto number = [&](std::string_view name) {
-    const Json* member = summary.find(name);
-    return member == nullptr ? 0.0 : member->get<double>();
-  };
-  const std::string& command = summary.at("command").text();
-  const double triangles = number("triangles"), layers = number("layers_total"), pixels = number("columns") * number("rows");
-  double area_mm2 = 0;  // of the boxes around the parts
-  for (const Json& part : summary.at("parts")) {
-    const Json &lo = part.at("bounds_mm").at("lo"), &hi = part.at("bounds_mm").at("hi");
-    const auto side_mm = [&](std::size_t axis) { return hi.at(axis).get<double>() - lo.at(axis).get<double>(); };
-    area_mm2 += part.at("copies").get<double>() * side_mm(0) * side_mm(1);
-  }
-  if (command == "jet") return layers * (3e-5 + 2e-11 * pixels);
-  if (command == "slice") return layers * 3e-6 * std::sqrt(triangles);
-  return layers * (1e-4 + 5e-6 * std::sqrt(triangles) + 6e-7 * area_mm2);
+  constexpr double kSecondsPerFile = 4e-5;
+  const double files = summary.at("command").text() == "jet" ? summary.at("layers_total").get<double>() : 0;
+  const Json* layers = summary.at("seconds").find("layers_estimate");
+  return layers == nullptr ? 0 : layers->get<double>() + kSecondsPerFile * files;
 } catch (const JsonError&) {
   return 0;
 }
 
+/// Processor seconds of loading, by the progress of a job.
+class LoadClock {
+ public:
+  void see(const ProgressEvent& event) {
+    const double now = process_seconds();
+    if (began_) seconds_ += now - *began_;
+    began_.reset();
+    if (event.stage == ProgressEvent::Stage::kLoading) began_ = now;
+  }
+  double seconds() const { return seconds_; }
+
+ private:
+  std::optional<double> began_;
+  double seconds_ = 0;
+};
+
 /// Costs in microseconds by dry runs.
 class DryRuns {
  public:
-  explicit DryRuns(const std::atomic<bool>& cancel) : run_(job_runner("", {})), cancel_(cancel) {}
+  DryRuns(std::uint64_t memory_bytes, const std::atomic<bool>& cancel)
+      : loaded_(std::make_shared<load::PartStore>(loaded_share(memory_bytes, 0))),
+        run_(job_runner("", loaded_)),
+        cancel_(cancel) {}
 
   /// files  cost from the files
-  std::uint64_t cost_of(const BatchJob& job, const CostedJob& files) {
-    constexpr double kSecondsPerByte = 1e-8;
-    const auto microseconds = [](double seconds) {
-      return static_cast<std::uint64_t>(std::clamp(std::round(1e6 * seconds), 1.0, static_cast<double>(kMaxJobCost)));
-    };
+  CostedJob cost_of(const BatchJob& job, const CostedJob& files) {
     std::vector<std::string> words = without_output(job.entry.words.unpacked());
-    const auto [known, is_new] = known_.try_emplace(hash_text(PackedWords(words).text()), 0);
-    if (!is_new) return known->second;
-    known->second = microseconds(kSecondsPerByte * static_cast<double>(files.cost));
+    const auto [known, is_new] = known_.try_emplace(hash_text(PackedWords(words).text()), files);
+    if (is_new) known->second = measure(job, std::move(words), files);
+    return known->second;
+  }
+
+ private:
+  static std::uint64_t microseconds(double seconds) {
+    return static_cast<std::uint64_t>(std::clamp(std::round(1e6 * seconds), 1.0, static_cast<double>(kMaxJobCost)));
+  }
+
+  CostedJob measure(const BatchJob& job, std::vector<std::string> words, CostedJob cost) {
+    constexpr double kSecondsPerByte = 1e-8;
+    cost.cost = microseconds(kSecondsPerByte * static_cast<double>(cost.cost));
+    cost.load = 0;
     words.push_back("--dry-run");
     const Result<Call> call = read_call(words);
-    if (!call || call->layer_mm == 0) return known->second;  // a job without dry runs, or one that will fail at once
+    if (!call || call->layer_mm == 0) return cost;  // a job without dry runs, or one that will fail at once
     BatchJob dry;
     dry.entry.words = words;
     dry.parsed = call->parsed;
     CallSettings settings;
     settings.layer_bytes = job.layer_bytes;
-    // A dry run takes as long as loading; a job that fails in it ends then.
-    const auto start = std::chrono::steady_clock::now();
-    const ProgressCallback ignored = [](const ProgressEvent&) {};
-    const BatchResult result = run_(dry, settings, ignored, cancel_);
-    const double load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    known->second = microseconds(load_seconds + (result.code == 0 ? estimate_seconds(result.value) : 0));
-    return known->second;
+    const double start = process_seconds();
+    LoadClock loading;
+    const ProgressCallback progress = [&](const ProgressEvent& event) { loading.see(event); };
+    const BatchResult result = run_(dry, settings, progress, cancel_);
+    double seconds = process_seconds() - start;
+    // A share loads a part once; what a further variant of it takes is a cost of its job.
+    if (cost.part != Hash128() && measured_.insert(cost.part).second) {
+      cost.load = microseconds(loading.seconds());
+      seconds -= loading.seconds();
+    }
+    // A job that fails in its dry run takes as long.
+    cost.cost = microseconds(seconds + (result.code == 0 ? estimate_seconds(result.value) : 0));
+    return cost;
   }
 
- private:
+  std::shared_ptr<load::PartStore> loaded_;
   RunJob run_;
   const std::atomic<bool>& cancel_;
-  std::map<Hash128, std::uint64_t, HashOrder> known_;  // by words
+  std::map<Hash128, CostedJob, HashOrder> known_;  // by words
+  std::set<Hash128, HashOrder> measured_;          // parts
 };
 
 /// The whole list, prepared without reading its input files. costs  of its files
@@ -168,10 +193,10 @@ Result<SharePlan> plan_by_dry_runs(std::vector<BatchEntry> entries, const BatchS
   if (!jobs) return jobs.error();
   if (has_shares(options.directory) && !options.overwrite)
     return agree_on_plan(options.directory, plan_shares(*jobs, costs, options.shares, with, kFileUnit), false);
-  DryRuns runs(cancel);
+  DryRuns runs(options.memory_bytes, cancel);
   for (std::size_t i = 0; i < jobs->size(); ++i) {
     const BatchJob& job = (*jobs)[i];
-    if (!job.refused) costs[i].cost = runs.cost_of(job, costs[i]);
+    if (!job.refused) costs[i] = runs.cost_of(job, costs[i]);
     if (cancel) return failure(Fault::kInterrupted, "interrupted; no share is planned");
     progress(i + 1);
   }

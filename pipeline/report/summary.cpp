@@ -47,8 +47,10 @@ void add_costs(const Summary& s, std::vector<NamedText>& lines) {
 void add_dry_run(const Summary& s, std::vector<NamedText>& lines) {
   lines.emplace_back("memory", fmt::format("mesh {}, index {}, a layer needs up to {}", readable_bytes(s.mesh_bytes),
                                            readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes)));
-  lines.emplace_back("time",
-                     fmt::format("load {}, index {}", readable_seconds(s.load_seconds), readable_seconds(s.index_seconds)));
+  std::string time = fmt::format("load {}, index {}", readable_seconds(s.load_seconds), readable_seconds(s.index_seconds));
+  if (s.estimated_layer_seconds)
+    time += fmt::format("; layers about {} on one processor", readable_seconds(*s.estimated_layer_seconds));
+  lines.emplace_back("time", time);
   if (!s.estimate_text.empty()) lines.emplace_back("files", s.estimate_text);
   lines.emplace_back("dry run", "nothing was written");
 }
@@ -197,6 +199,7 @@ std::string Summary::json() const {
            {"oversized_layers", oversized_layers},
            {"parts", part_list},
            {"warnings", warnings_json(warnings)}};
+  if (estimated_layer_seconds) all["seconds"]["layers_estimate"] = *estimated_layer_seconds;
   if (timing) all["timing"] = timing_json(*timing);
   all.update(facts);
   return json_line(all);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,6 +29,7 @@ struct Summary {
   double volume_mm3 = 0;        // of set pixels, contours or beads
   std::uint64_t bytes_written = 0;
   double load_seconds = 0, index_seconds = 0, layer_seconds = 0;  // wall
+  std::optional<double> estimated_layer_seconds;                  // of processors, of a dry run that sampled layers
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step, over all threads
   std::shared_ptr<Timing> timing;                                 // null unless the job requests it
   std::uint64_t mesh_bytes = 0, index_bytes = 0, peak_layer_bytes = 0, memory_budget_bytes = 0, peak_resident_bytes = 0;

@@ -229,7 +229,7 @@ class ImageMaker : public Maker {
     }
     add("encode",
         [this](const Layer&, Work& work, Made& made) { return files_.encode(images_of(work), work.files, made.record); });
-    add("store",
+    add(kStoreStep,
         [this](const Layer&, Work& work, Made& made) { return files_.store(images_of(work), work.files, made.record); });
     return steps;
   }

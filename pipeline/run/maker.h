@@ -23,6 +23,9 @@ struct MakerStep {
   std::function<Result<std::uint64_t>(std::uint32_t layer, const Ticket&)> needs = {};
 };
 
+/// The name of steps that write files.
+inline constexpr std::string_view kStoreStep = "store";
+
 class Maker {
  public:
   virtual ~Maker() = default;

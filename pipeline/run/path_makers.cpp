@@ -221,7 +221,7 @@ class ContourMaker : public Maker {
                if (!files_.records_contours()) work.contours.contours = Contours();
                return encoded;
              }},
-            {"store", [&](std::uint32_t layer, const Ticket& ticket) {
+            {kStoreStep, [&](std::uint32_t layer, const Ticket& ticket) {
                return files_.store(layer, work_[ticket.work].text, made_[ticket.work]);
              }}};
   }

@@ -20,6 +20,7 @@
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/job_checks.h"
 #include "pipeline/run/path_makers.h"
+#include "pipeline/run/sample.h"
 #include "pipeline/run/space.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/support/text/number_text.h"
@@ -263,6 +264,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
     for (std::uint32_t i = plan->range[0]; i < plan->range[1]; ++i) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, maker->bytes_of(i));
     }
+    summary.estimated_layer_seconds = sample_layers(*maker, plan->range, cancel);
   } else if (Status status = make_layers(*plan, *maker, checks, limits, summary, progress, cancel); !status) {
     return status.error();
   }

@@ -70,6 +70,12 @@ TEST_F(Jobs, DryRunWritesNothing) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_FALSE(fs::exists(directory_ / "out"));
   EXPECT_NE(outcome.err.find("nothing was written"), std::string::npos);
+  for (const char* command : {"jet", "slice"}) {
+    const Json json = Json::parse(lamina({command, "part.stl", "--dry-run", "--json", "--quiet", "-o", "out"}).out);
+    EXPECT_GT(json["seconds"]["layers_estimate"].get<double>(), 0) << command;
+    EXPECT_EQ(json["layers_planned"], 0);
+  }
+  EXPECT_FALSE(fs::exists(directory_ / "out"));
 }
 
 TEST_F(Jobs, ShardsMergeIntoTheUndividedJobInOneDirectoryOrSeveral) {

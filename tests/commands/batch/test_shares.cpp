@@ -404,8 +404,8 @@ TEST_F(BatchInShares, PlanSharesEstimatesByDryRunsAndRunsNoJob) {
     if (cells.at(0) != "job") costs.push_back(std::stod(cells.at(2)));
   }
   ASSERT_EQ(costs.size(), 6u);
-  EXPECT_EQ(costs[0], costs[1]);
-  EXPECT_GT(costs[2], costs[0]);
+  EXPECT_GE(costs[0], costs[1]) << "the first of two jobs with equal words loads the part";
+  EXPECT_GT(costs[2], costs[1]);
   // The shares follow it; a second plan of the same list changes nothing.
   EXPECT_EQ(share("1/2").code + share("2/2").code, 3);
   EXPECT_EQ(lamina({"batch", "jobs.txt", "-o", "out", "--plan-shares", "2", "--quiet"}).code, 0);
