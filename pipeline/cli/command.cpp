@@ -163,6 +163,9 @@ Outcome run_lamina(const std::vector<std::string>& words, Console& console) {
 
 namespace {
 
+/// Address space that the libraries take when they start. oneTBB waits for itself for ever if it gets none then.
+constexpr std::uint64_t kStartBytes = 4 << 20;
+
 /// Memory may run out where no exception may pass. Finished layers are on record by then.
 [[noreturn]] void end_without_memory() {
   try {
@@ -188,6 +191,7 @@ int run_program(int argument_count, char** arguments, Program program) {
   std::set_terminate(end_without_memory);
   Console console;
   try {
+    if (const Status room = check_address_space(kStartBytes); !room) return console.end(console.complain(room.error()));
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
     for (const std::string& left : take_left_behind()) console.say("lamina: note: " + left);
     return console.end(outcome.error ? console.complain(*outcome.error) : outcome.code);

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -65,6 +66,14 @@ std::uint64_t refused_allocations() {
 void note_refused_block(std::uint64_t bytes) { refused_block = bytes; }
 
 std::uint64_t needed_address_space() { return std::max(max_address_space() + refused_block.load(), limit_of(RLIMIT_AS)); }
+
+Status check_address_space(std::uint64_t bytes) {
+  if (limit_of(RLIMIT_AS) == 0) return {};
+  void* const block = ::mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (block != MAP_FAILED) return ::munmap(block, bytes), Status();
+  note_refused_block(bytes);
+  return shortage(ENOMEM);
+}
 
 bool is_shortage(int reason) { return reason == ENOMEM || reason == EMFILE || reason == ENFILE; }
 

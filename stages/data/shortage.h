@@ -19,6 +19,10 @@ std::uint64_t refused_allocations();
 /// more than its limit. 0: unknown. Allocates nothing.
 std::uint64_t needed_address_space();
 
+/// Checks that this much address space is free, where the system limits it. errors  kMemory
+/// cost  a system call; three under a limit
+Status check_address_space(std::uint64_t bytes);
+
 /// Whether an exception says that the system gives no more memory, threads or open files.
 bool is_shortage(const std::exception& problem);
 

@@ -209,8 +209,8 @@ ArgumentReader::ArgumentReader(const CommandSpec& spec) : spec_(spec), state_(st
             : app.add_option(flags, texts)->type_name(option.value)->expected(1)->allow_extra_args(false)->take_all());
     for (const std::string_view name : split(flags, ",")) state_->known.push_back(name);
   }
-  if (!spec.operand.empty()) {
-    app.add_option(spec.operand, state_->operands)->type_name("")->expected(0, 1 << 29);
+  if (!spec.operand.empty()) {  // its name may contain spaces, which CLI11 2.4 refuses
+    app.add_option("operands", state_->operands)->type_name("")->expected(0, 1 << 29);
   }
 }
 

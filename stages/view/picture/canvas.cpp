@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <filesystem>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -16,7 +18,19 @@
 namespace lamina::view::picture {
 namespace {
 
-constexpr const char* kFont = "DejaVuSans";  // found by OpenImageIO in the system's font folders
+/// The font's file in the folders of Debian, Fedora and Arch; its name otherwise, by which OpenImageIO 2.4 searches all font
+/// folders of the system, and 2.5 some.
+const std::string& font() {
+  static const std::string found = [] {
+    for (const char* folder : {"truetype/dejavu", "dejavu-sans-fonts", "dejavu", "TTF"}) {
+      std::error_code error;
+      std::string file = fmt::format("/usr/share/fonts/{}/DejaVuSans.ttf", folder);
+      if (std::filesystem::is_regular_file(file, error)) return file;
+    }
+    return std::string("DejaVuSans");
+  }();
+  return found;
+}
 
 /// One "?" for each character of UTF-8 that is not printable ASCII.
 std::string ascii(const std::string& line) {
@@ -96,7 +110,7 @@ void Canvas::text(int left, int baseline, int size, const std::string& line, Col
   const float channels[3] = {static_cast<float>(colour.red) / 255, static_cast<float>(colour.green) / 255,
                              static_cast<float>(colour.blue) / 255};
   errno = 0;
-  if (!OIIO::ImageBufAlgo::render_text(pixels_, left, baseline, ascii(line), size, kFont, channels)) throw_shortage();
+  if (!OIIO::ImageBufAlgo::render_text(pixels_, left, baseline, ascii(line), size, font(), channels)) throw_shortage();
 }
 
 Result<Buffer<std::byte>> Canvas::png() const {
@@ -122,7 +136,7 @@ Result<Buffer<std::byte>> Canvas::png() const {
 bool have_font() {
   static const bool found = [] {
     errno = 0;
-    const bool measured = OIIO::ImageBufAlgo::text_size("0", 16, kFont).defined();
+    const bool measured = OIIO::ImageBufAlgo::text_size("0", 16, font()).defined();
     if (!measured) throw_shortage();
     if (!measured) OIIO::geterror();  // taken, so that it is not printed at the end of the program
     return measured;
@@ -132,7 +146,7 @@ bool have_font() {
 
 int text_width(const std::string& line, int size) {
   if (!have_font()) return 0;
-  const OIIO::ROI box = OIIO::ImageBufAlgo::text_size(ascii(line), size, kFont);
+  const OIIO::ROI box = OIIO::ImageBufAlgo::text_size(ascii(line), size, font());
   return box.defined() ? box.xend : 0;
 }
 
