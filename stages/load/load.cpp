@@ -298,7 +298,7 @@ Result<Format> detect(const Source& source) {
 /// The inflated bytes of an opened file; from the store, if it has them.
 Result<Source> inflated(const Source& source, const LoadOptions& options) {
   const std::string path(source.path()), key = fmt::format("gzip {} {}", options.expanded_limit, path);
-  const std::optional<FileStamp> stamp = options.store ? file_stamp(path) : std::nullopt;
+  const std::optional<FileStamp> stamp = options.store ? source.stamp() : std::nullopt;
   if (stamp) {
     if (auto known = options.store->find<Buffer<char>>(key, *stamp)) return Source::of_memory(path, std::move(known));
   }

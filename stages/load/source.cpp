@@ -31,10 +31,11 @@ std::size_t claimed_size(const Source& compressed) {
 
 Result<Source> Source::open(const std::string& path) {
   if (path == "-") return Error{Fault::kInput, "-: parts are not read from standard input; write it to a file first"};
-  auto file = FileReader::open(path, kRules);
-  if (!file) return file.error();
   Source source;
   source.path_ = path;
+  source.stamp_ = file_stamp(path);
+  auto file = FileReader::open(path, kRules);
+  if (!file) return file.error();
   source.size_ = file->size();
   source.file_.emplace(std::move(*file));
   return source;

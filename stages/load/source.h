@@ -10,6 +10,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
+#include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::load {
@@ -25,6 +26,8 @@ class Source {
   static Source of_memory(std::string path, std::shared_ptr<const Buffer<char>> bytes);
 
   std::string_view path() const { return path_; }
+  /// Of the file before it was opened; nothing in memory.
+  const std::optional<FileStamp>& stamp() const { return stamp_; }
   std::uint64_t size() const { return size_; }
   /// The bytes, if they are in memory.
   const std::shared_ptr<const Buffer<char>>& memory() const { return memory_; }
@@ -41,6 +44,7 @@ class Source {
 
  private:
   std::string path_;
+  std::optional<FileStamp> stamp_;
   std::optional<FileReader> file_;  // else in memory
   std::shared_ptr<const Buffer<char>> memory_;
   std::uint64_t size_ = 0;

@@ -81,7 +81,7 @@ Result<UnplacedPackage> read_package(const Source& source, const LoadOptions& op
 Result<std::shared_ptr<const UnplacedPackage>> package_of(const Source& source, const LoadOptions& options) {
   const std::string path(source.path());
   const std::string key = fmt::format("3mf {} {} {}", options.triangle_limit, options.expanded_limit, path);
-  const std::optional<FileStamp> stamp = options.store ? file_stamp(path) : std::nullopt;
+  const std::optional<FileStamp> stamp = options.store ? source.stamp() : std::nullopt;
   if (stamp) {
     if (auto known = options.store->find<UnplacedPackage>(key, *stamp)) return known;
   }

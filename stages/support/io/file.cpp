@@ -371,18 +371,20 @@ std::optional<FileId> file_id(const std::string& path) {
 }
 
 std::optional<FileStamp> file_stamp(const std::string& path) {
-  constexpr std::int64_t kStepNs = 100'000'000;
+  // Times of FAT, and of ext4 with small inodes, have steps of up to 2 s; all others of the system's clock.
+  constexpr std::int64_t kStepNs = 100'000'000, kCoarseStepNs = 2'100'000'000, kCoarseNs = 10'000'000;
   const auto ns = [](const timespec& time) { return time.tv_sec * 1'000'000'000 + time.tv_nsec; };
   struct stat now {};
   timespec clock{};
   errno = 0;
   ::clock_gettime(CLOCK_REALTIME, &clock);
   if (::stat(path.c_str(), &now) != 0 || !S_ISREG(now.st_mode)) return std::nullopt;
+  const bool coarse = ns(now.st_mtim) % kCoarseNs == 0 && ns(now.st_ctim) % kCoarseNs == 0;
   return FileStamp{{now.st_dev, now.st_ino},
                    static_cast<std::uint64_t>(now.st_size),
                    ns(now.st_mtim),
                    ns(now.st_ctim),
-                   ns(clock) - ns(now.st_ctim) > kStepNs};
+                   ns(clock) - ns(now.st_ctim) > (coarse ? kCoarseStepNs : kStepNs)};
 }
 
 bool same_file(const std::string& a, const std::string& b) {
