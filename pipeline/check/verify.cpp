@@ -359,6 +359,8 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
     jobs.push_back({&manifest.head, first, first + consumed + static_cast<std::uint32_t>(manifest.layers.size())});
   }
   for (const std::string& name : stray_files(directory, jobs)) report.add(fmt::format("{}: no manifest names it", name));
+  if (!is_container(directory)) return;
+  for (const std::string& name : misplaced_entries(directory)) report.add(fmt::format("{}: no manifest names it", name));
 }
 
 VerifyReport verify_paths(const std::string& name, const std::string& directory, const Manifest& manifest) {
@@ -446,6 +448,18 @@ void check_sums(const std::string& container, VerifyReport& report) {
   }
 }
 
+/// Folders of the names that pages have would be read instead. errors  kVerification
+Status check_pages_in_sight(const std::string& directory) {
+  const std::string pages = pages_path(directory);
+  for (const char* folder : {"layers", "program"}) {
+    const fs::path path = fs::path(directory) / folder;
+    std::error_code error;
+    if (!pages.empty() && fs::exists(fs::symlink_status(path, error)))
+      return failure(Fault::kVerification, "{}: hides what {} contains; remove or rename it", path.string(), pages);
+  }
+  return {};
+}
+
 Result<VerifyReport> verify_any(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
   if (!is_container(directory) && fs::is_regular_file(directory, error)) {
@@ -465,6 +479,7 @@ Result<VerifyReport> verify_any(const std::string& directory, const VerifyOption
     if (!manifest) return manifest.error();
     return verify_paths(directory, directory, *manifest);
   }
+  if (Status status = check_pages_in_sight(directory); !status) return status.error();
   VerifyReport report;
   report.directory = directory;
   if (is_container(directory)) check_sums(directory, report);

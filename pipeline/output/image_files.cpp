@@ -423,7 +423,10 @@ Status ImageFiles::start_pages() {
   manifest_.emplace(std::move(*manifest));
   claim_.reset();
   auto pages = PagedJob::open(job, head_, needs_big_pages(), kept_pages_, program_ ? &*program_ : nullptr);
-  if (!pages) return pages.error();
+  if (!pages) {
+    if (kept_.empty()) manifest_->discard();  // else the record of the layers that --resume continues
+    return pages.error();
+  }
   pages_.emplace(std::move(*pages));
   return {};
 }

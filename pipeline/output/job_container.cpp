@@ -75,9 +75,17 @@ Status check_not_begun(const Job& job) {
 
 /// Other programs use names in .part too.
 Status check_part_is_ours(const Job& job) {
-  constexpr std::array<std::string_view, 1> kMarks = {"^PK\x03\x04"};
-  if (is_replaceable(part_of(job.output), kMarks)) return {};
-  return usage("{}: is no unfinished container of lamina; remove it, or name another file with -o", part_of(job.output));
+  const std::string part = part_of(job.output);
+  if (is_replaceable(part, {}) || begins_like_job(part) || has_manifest_head(part_of(container_manifest(job)))) return {};
+  return usage("{}: is no unfinished container of lamina; remove it, or name another file with -o", part);
+}
+
+/// A file that is not continued: damaged, or of another kind.
+Error no_container(const std::string& path) {
+  const auto entries = begins_like_job(path) ? read_entries(path) : Result<std::vector<ContainerEntry>>(Error{});
+  if (!entries && !entries.error().message.empty())
+    return failure(Fault::kVerification, "{}; make it again with --overwrite, or name another file", entries.error().message);
+  return usage("{}: is no container of a job, which --resume continues; name another file with -o", path);
 }
 
 }  // namespace
@@ -102,8 +110,7 @@ Status check_container(const Job& job) {
     return Error{Fault::kOutput, fmt::format("{}: is no file; a container cannot be written to it", job.output)};
   if (const Status made = job.dry_run ? Status() : check_can_write(job.output, true); !made) return made;
   if (Status busy = check_not_being_written(container_manifest(job)); !busy) return busy;
-  if (fs::exists(status) && job.resume && !is_container(job.output))
-    return usage("{}: is no container of a job, which --resume continues; name another file with -o", job.output);
+  if (fs::exists(status) && job.resume && !is_container(job.output)) return no_container(job.output);
   if (Status ours = check_part_is_ours(job); !ours) return ours;
   if (job.resume || job.overwrite) return {};
   if (fs::exists(status) && is_container(job.output))
@@ -111,6 +118,11 @@ Status check_container(const Job& job) {
                  job.output);
   if (fs::exists(status)) return usage("{}: is there already; replace it with --overwrite, or name another file", job.output);
   return check_not_begun(job);
+}
+
+bool has_whole_entries(const std::string& container) {
+  const auto entries = read_entries(container);
+  return entries && count_with_sums(container, *entries) == entries->size();
 }
 
 Result<Claim> claim_container(const Job& job, MadeFolders& made) {

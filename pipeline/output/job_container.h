@@ -30,9 +30,12 @@ std::string container_manifest(const Job& job);
 bool has_program_frame(const std::string& output, const ManifestHead& head, bool end);
 
 /// Checks that a job may write its container. Changes nothing.
-/// errors  kUsage: a job is there, without --resume or --overwrite, or somebody else's NAME.part; kOutput: a directory, or
-///         another run writes it
+/// errors  kUsage: a job is there, without --resume or --overwrite, or somebody else's NAME.part; kVerification: what is to be
+///         continued is damaged; kOutput: a directory, or another run writes it
 Status check_container(const Job& job);
+
+/// Whether all entries of a finished container have the bytes that their CRC states. cost  reads the container
+bool has_whole_entries(const std::string& container);
 
 /// Claims the container for the rest of the run and makes the folders above it. errors  of check_container and Claim::take
 Result<Claim> claim_container(const Job& job, MadeFolders& made);

@@ -41,16 +41,40 @@ void keep_pages(const ManifestHead& head, const PageList& found, const FileReade
       if (!program.empty()) program_end = content.program_offset + content.program_bytes;
       program.clear();  // the first image names it
     }
+    if (next == 0) return;  // a layer without images
     kept.program_end = program_end;
     kept.last = found.pages[next - 1];
     kept.layers.push_back(record);
   }
 }
 
-/// Gives a finished file the name of an unfinished one. errors  kOutput
+/// Gives a finished file, which is the one that was checked, the name of an unfinished one, also if that is there.
+/// errors  kOutput
 Status reopen_name(const std::string& file) {
-  if (!is_file(file) || is_file(part_of(file))) return {};
+  if (!is_file(file)) return {};
   return std::rename(file.c_str(), part_of(file).c_str()) == 0 ? Status() : Status(write_failure(file, errno));
+}
+
+/// A run leaves one of both names, and the other one is not of the job. errors  kUsage
+Status check_one_name(const std::string& directory) {
+  for (const std::string& name : names_in_folder(directory)) {
+    if (name != kPagesFile && !name.starts_with("program.")) continue;
+    const std::string file = fmt::format("{}/{}", directory, name);
+    std::error_code error;
+    if (fs::exists(fs::symlink_status(part_of(file), error)))
+      return usage("{} and {} are both there; remove the one that is not of this job", file, part_of(file));
+  }
+  return {};
+}
+
+/// Before anything changes. errors  kOutput
+Status check_no_links(const std::string& file) {
+  for (const std::string& name : {file, part_of(file)}) {
+    std::error_code error;
+    if (fs::is_symlink(fs::symlink_status(name, error)))
+      return failure(Fault::kOutput, "{}: is a link, and its file would be changed; put the file in its place", name);
+  }
+  return {};
 }
 
 }  // namespace
@@ -71,7 +95,7 @@ Status check_kind_of_output(const Job& job) {
     if (fs::exists(fs::symlink_status(fmt::format("{}/{}", job.output, folder), error)))
       return usage("{}/{}: is there already, which --container tiff does not write; {}", job.output, folder, kAdvice);
   }
-  if (job.resume && !pages.empty()) return {};
+  if (job.resume && !pages.empty()) return check_one_name(job.output);
   for (const std::string& name : names_in_folder(job.output)) {
     const bool of_program = !job.machine.profile.empty() && (name == "machine.toml" || name.starts_with("program."));
     if (name == kPagesFile || of_program) return usage("{}/{}: is there already; {}", job.output, name, kAdvice);
@@ -114,6 +138,9 @@ Result<KeptPages> find_kept_pages(const Job& job, const ManifestHead& head, bool
   keep_pages(head, *pages, *file, *layers, kept);
   kept.finished = kept.layers.size() == head.last_layer - head.first_layer && is_file(manifest) && path == pages_file(job) &&
                   has_program_frame(job.output, head, true) && formats::tiff::fault_of_pages(path).empty();
+  for (const std::string& name : {pages_file(job), program_file(job, head)}) {
+    if (Status status = kept.last && !kept.finished ? check_no_links(name) : Status(); !status) return status.error();
+  }
   return kept;
 }
 

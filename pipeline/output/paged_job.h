@@ -41,7 +41,7 @@ struct KeptPages {
 };
 
 /// big     whether the job writes a BigTIFF
-/// errors  of layers_that_hold
+/// errors  of layers_that_hold; kOutput: a link where a file is to be continued
 /// cost    reads every file once
 Result<KeptPages> find_kept_pages(const Job& job, const ManifestHead& head, bool big);
 

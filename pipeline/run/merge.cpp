@@ -105,7 +105,14 @@ Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report)
   return {};
 }
 
-Status check_file(const std::string& file, std::uint64_t bytes) {
+/// A file of a shard's directory has to have its size; what is copied out of a container or of pages, its hash too.
+Status check_file(const std::string& directory, const std::string& name, const Hash128& hash, std::uint64_t bytes) {
+  const std::string file = (fs::path(directory) / name).string();
+  if (entry_bytes(file)) {
+    const std::string fault = fault_of_file(directory, name, hash, bytes);
+    return fault.empty() ? Status()
+                         : Status(unmatched(fmt::format("{}/{}; run its shard again with --resume", directory, fault)));
+  }
   if (!is_compressed(file)) return check_plain(file, bytes);
   if (Status status = check_plain(file); !status) return status;
   const std::string fault = fault_of_stored(file, bytes);
@@ -116,18 +123,18 @@ Status check_file(const std::string& file, std::uint64_t bytes) {
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
   const bool in_place = same_file(shard.directory, output);
   const ManifestHead& head = shard.manifest.head;
-  const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
+  const auto bring = [&](const std::string& name, const Hash128& hash, std::uint64_t bytes) -> Status {
     if (name.empty()) return {};  // a format without files, a job without a machine
     const fs::path from = fs::path(shard.directory) / name;
-    if (Status status = check_file(from.string(), bytes); !status) return status;
+    if (Status status = check_file(shard.directory, name, hash, bytes); !status) return status;
     return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
   };
   for (const LayerRecord& record : shard.manifest.layers) {
     for (const LayerImageFile& image : layer_images(head, record)) {
-      if (Status status = bring(image.name, image.record.bytes); !status) return status;
+      if (Status status = bring(image.name, image.record.hash, image.record.bytes); !status) return status;
     }
     const std::string program = program_file_name(record.layer.index, head.program_extension);
-    if (Status status = bring(program, record.program.bytes); !status) return status;
+    if (Status status = bring(program, record.program.hash, record.program.bytes); !status) return status;
   }
   if (head.machine.empty()) return {};
   // The files that all shards write identically.
@@ -284,7 +291,7 @@ class ContainerMerge {
   }
 
   Status run(const std::string& output, const std::optional<Json>& inspection) {
-    if (is_file(output) && !is_whole(output)) return usage("{}: is there already; name another file with -o", output);
+    if (is_file(output) && !is_of_job(output)) return usage("{}: is there already; name another file with -o", output);
     Job job;
     job.output = output;
     const auto begun = read_manifest_head(part_of(container_manifest(job)));
@@ -294,13 +301,15 @@ class ContainerMerge {
     MadeFolders made;
     auto claim = claim_container(job, made);
     if (!claim) return claim.error();
-    if (is_file(output) && is_whole(output)) {  // of a merge that was killed at its very end
+    KeptContainer damaged;
+    damaged.replaces = is_file(output);
+    if (damaged.replaces && has_whole_entries(output)) {  // of a merge that was killed at its very end
       remove_or_note(part_of(container_manifest(job)));
       report_.shards = 0;
       report_.layers = head_.layer_count;
       return {};
     }
-    auto container = JobContainer::open(job, {});
+    auto container = JobContainer::open(job, damaged);
     if (!container) return container.error();
     container_.emplace(std::move(*container));
     auto writer = ManifestWriter::open(container_manifest(job), head_, {}, {}, std::move(*claim));
@@ -319,7 +328,7 @@ class ContainerMerge {
 
  private:
   /// Whether a container has all layers of the same job.
-  bool is_whole(const std::string& path) const {
+  bool is_of_job(const std::string& path) const {
     const auto there = read_manifest(path + "/manifest.json");
     return there && same_job(there->head, head_) && covers_all(there->head);
   }

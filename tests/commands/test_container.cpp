@@ -178,6 +178,10 @@ TEST_F(Containers, ResumeKeepsWhatIsNotOfTheJob) {
   expect_refused(kBoxJob + " -o out --resume" + container, 2, "contains no manifest.json", directory_);
   write_text(directory_ / "mine.zip.part", "a download that another program has begun");
   expect_refused(kBoxJob + " -o mine" + container, 2, "is no unfinished container", directory_);
+  write_text(directory_ / "package.zip.part", "PK\x03\x04" + std::string(26, '\0') + "3D/3dmodel.model and much more");
+  for (const std::string& line : {kBoxJob + container + " -o package", std::string("merge out.zip -o package.zip")})
+    EXPECT_NE(run_lamina(words_of(line), directory_.path()).code, 0);
+  EXPECT_TRUE(text("package.zip.part").ends_with("and much more"));
   // The begun job of a name is not replaced by a merge.
   lamina(kBoxJob + " -o other" + container + " --shard 2/2");
   lamina(kWithProgram + " -o begun" + container);
@@ -206,6 +210,46 @@ TEST_F(Containers, SumsAndNamesThatUnpackersCheckAreChecked) {
   for (std::size_t at = twice.find("000003.tif"); at != std::string::npos; at = twice.find("000003.tif")) twice[at + 5] = '2';
   write_text(directory_ / "out.zip", twice);
   EXPECT_NE(lamina("verify out.zip", 5).err.find("occurs twice"), std::string::npos);
+}
+
+TEST_F(Containers, WhatUnpackersRefuseIsDamaged) {
+  lamina(kBoxJob + " -o out --container zip --quiet");
+  const std::string whole = text("out.zip");
+  const std::size_t first = whole.find("PK\x01\x02"), last = whole.rfind("PK\x01\x02"), end = whole.rfind("PK\x05\x06");
+  // Version needed, encrypted, first disk; disks, entries on this disk, size of the directory (APPNOTE 4.3.12, 4.3.16).
+  for (const std::size_t at : {first + 6, first + 8, last + 8, last + 34, end + 4, end + 6, end + 8, end + 12, end + 16}) {
+    std::string damaged = whole;
+    damaged[at] ^= at == first + 6 ? '\x80' : 1;
+    write_text(directory_ / "out.zip", damaged);
+    lamina("verify out.zip --quiet", 5);
+    expect_refused(kBoxJob + " -o out --container zip --resume", 5, "make it again with --overwrite", directory_);
+  }
+  EXPECT_EQ(files_below(directory_.path()), (std::vector<std::string>{"out.zip", "part.stl"}));
+}
+
+TEST_F(Containers, EntriesBelowAFolderOrOutsideAreNamed) {
+  lamina(kBoxJob + " -o out --container zip --quiet");
+  std::string file = text("out.zip");  // the entry and the directory name it; between them, the manifest does
+  for (const std::size_t at : {file.find("layers/000003.tif"), file.rfind("layers/000003.tif")})
+    file.replace(at, 17, "layers/0/../3.tif");
+  write_text(directory_ / "out.zip", file);
+  EXPECT_NE(lamina("verify out.zip", 5).err.find("layers/0/../3.tif: no manifest names it"), std::string::npos);
+}
+
+TEST_F(Containers, AMergeMakesADamagedWholeAgainAndCopiesNoDamage) {
+  for (const char* shard : {"1", "2"})
+    lamina(kBoxJob + " --container zip --quiet -o s" + shard + ".zip --shard " + shard + "/2");
+  lamina("merge s1.zip s2.zip -o all.zip --quiet");
+  const std::string whole = text("all.zip");
+  std::string damaged = whole;
+  damaged[damaged.find("layers/000003.tif") + 40] ^= 1;
+  write_text(directory_ / "all.zip", damaged);
+  lamina("merge s1.zip s2.zip -o all.zip --quiet");
+  EXPECT_TRUE(text("all.zip") == whole);
+  std::string shard = text("s1.zip");
+  shard[shard.find("layers/000003.tif") + 40] ^= 1;
+  write_text(directory_ / "s1.zip", shard);
+  EXPECT_NE(lamina("merge s1.zip s2.zip -o folder", 5).err.find("layers/000003.tif"), std::string::npos);
 }
 
 TEST_F(Containers, NamesOfNoFileAreRefused) {

@@ -34,6 +34,13 @@ class PagedJobs : public ::testing::Test {
   }
   std::string text(const std::string& name) { return read_text(directory_ / name); }
 
+  std::string program_name(const std::string& paged) {
+    for (const std::string& name : files_below(directory_ / paged)) {
+      if (name.starts_with("program.")) return name;
+    }
+    return {};
+  }
+
   /// The files that paths lead to are those of the job in folders, and the program is the concatenation of its parts.
   void expect_files_of(const std::string& paged, const std::string& folder) {
     EXPECT_EQ(text(paged + "/manifest.json"), text(folder + "/manifest.json"));
@@ -171,6 +178,39 @@ TEST_F(PagedJobs, DamageIsFoundAndMadeAgain) {
   expect_found("out/program.planes.zst", program, page.content.program_offset + 20, "program/000017.planes.zst");
   write_text(directory_ / "out/program.old", "");
   EXPECT_NE(lamina("verify out", 5).err.find("program.old: no manifest names it"), std::string::npos);
+}
+
+TEST_F(PagedJobs, FilesThatAreNotOfTheJobAreNeitherContinuedNorReplaced) {
+  const std::string job = kPagesWithProgram + kAsPages + " -o out";
+  lamina(job);
+  lamina(kPagesWithProgram + kAsPages + " -o other --rotate 0,0,90");
+  const std::string whole = text("out/layers.tif"), program = fs::path(program_name("out")).filename();
+  std::string damaged = whole;
+  damaged[damaged.size() * 3 / 4] ^= 1;
+  write_text(directory_ / "out/layers.tif", damaged);
+  for (const std::string& name : {std::string("layers.tif"), program}) {
+    fs::copy_file(directory_ / ("other/" + name), directory_ / ("out/" + name + ".part"));
+    expect_refused(job + " --resume", 2, "are both there", directory_);
+    fs::remove(directory_ / ("out/" + name + ".part"));
+  }
+  fs::rename(directory_ / "out/layers.tif", directory_ / "real.tif");
+  fs::create_symlink("../real.tif", directory_ / "out/layers.tif");
+  expect_refused(job + " --resume", 4, "is a link", directory_);
+  EXPECT_TRUE(fs::exists(directory_ / "out/manifest.json"));
+  fs::remove(directory_ / "out/layers.tif");
+  fs::rename(directory_ / "real.tif", directory_ / "out/layers.tif");
+  lamina(job + " --resume");
+  EXPECT_TRUE(text("out/layers.tif") == whole);
+  fs::create_directory(directory_ / "out/layers");
+  EXPECT_NE(lamina("verify out", 5).err.find("out/layers: hides what out/layers.tif contains"), std::string::npos);
+}
+
+TEST_F(PagedJobs, AJobThatCannotBeginLeavesNoRecord) {
+  fs::create_directories(directory_ / "out/layers.tif.part");
+  lamina(kPlainPages + kAsPages + " -o out", 4);
+  EXPECT_FALSE(fs::exists(directory_ / "out/manifest.json.part"));
+  fs::remove(directory_ / "out/layers.tif.part");
+  lamina(kPlainPages + kAsPages + " -o out");
 }
 
 TEST_F(PagedJobs, ShardsOfLayersAreMergedIntoADirectory) {

@@ -30,7 +30,9 @@ constexpr std::string_view kEntry = "PK\x03\x04", kInDirectory = "PK\x01\x02", k
                            kLocator64 = "PK\x06\x07", kManifest = "manifest.json", kOfShard = "manifest-";
 constexpr std::size_t kEntryHead = 30, kDirectoryHead = 46, kEndBytes = 22, kEnd64Bytes = 56, kLocatorBytes = 20;
 constexpr std::uint64_t kMaxDirectory = 256ull << 20, kMaxCopied = 1ull << 30;  // bytes
-constexpr std::uint64_t kUtf8 = 1 << 11;                                        // flag of a name
+constexpr std::string_view kUnreadable = "cannot be read";
+constexpr std::uint64_t kUtf8 = 1 << 11;   // flag of a name
+constexpr std::uint64_t kMaxVersion = 63;  // needed to extract; 45: Zip64
 
 class Descriptor {
  public:
@@ -85,6 +87,11 @@ bool widen(std::string_view extra, std::span<std::uint64_t* const> numbers) {
   return true;
 }
 
+/// Whether unpackers read an entry: not encrypted, of no later version. at  of the version, which the flags follow
+bool is_plain(std::string_view head, std::size_t at) {
+  return little(head, at, 2) <= kMaxVersion && (little(head, at + 2, 2) & ~kUtf8) == 0;
+}
+
 /// What precedes the data of an entry.
 struct EntryHead {
   ContainerEntry entry;
@@ -108,7 +115,7 @@ std::optional<EntryHead> read_head(int file, std::uint64_t offset, std::uint64_t
   found.data = offset + kEntryHead + text.size();
   if (!widen(std::string_view(text).substr(name), std::array{&found.entry.bytes, &found.packed})) return std::nullopt;
   if (found.data > file_bytes || found.packed > file_bytes - found.data) return std::nullopt;
-  found.stored = (little(head, 6, 2) & ~kUtf8) == 0 && little(head, 8, 2) == 0 && found.packed == found.entry.bytes;
+  found.stored = is_plain(head, 4) && little(head, 8, 2) == 0 && found.packed == found.entry.bytes;
   return found;
 }
 
@@ -119,8 +126,9 @@ bool is_folder(const ContainerEntry& entry) { return entry.name.ends_with('/'); 
 std::vector<ContainerEntry> walk(int file, std::uint64_t file_bytes, std::uint64_t& end) {
   std::vector<ContainerEntry> entries;
   end = 0;
+  constexpr std::size_t kMaxEntries = kMaxDirectory / kDirectoryHead;  // of a directory that is read
   while (auto head = read_head(file, end, file_bytes)) {
-    if (!head->stored) break;
+    if (!head->stored || entries.size() == kMaxEntries) break;
     end = head->data + head->packed;
     if (!is_folder(head->entry)) entries.push_back(std::move(head->entry));
   }
@@ -143,15 +151,22 @@ std::optional<DirectoryRange> find_directory(int file, std::uint64_t file_bytes)
   while (at != std::string::npos && !ends_there()) at = at == 0 ? std::string::npos : tail.rfind(kEnd, at - 1);
   if (at == std::string::npos) return std::nullopt;
   DirectoryRange range{little(tail, at + 16, 4), little(tail, at + 12, 4), little(tail, at + 10, 2)};
+  std::uint64_t end = file_bytes - tail.size() + at;
+  bool one_disk = little(tail, at + 4, 4) == 0 && little(tail, at + 8, 2) == range.entries;
   const bool wide = range.offset == UINT32_MAX || range.bytes == UINT32_MAX || range.entries == UINT16_MAX;
   if (wide && at >= kLocatorBytes && std::string_view(tail).substr(at - kLocatorBytes).starts_with(kLocator64)) {
     std::array<char, kEnd64Bytes> record{};
-    const std::uint64_t position = little(tail, at - kLocatorBytes + 8, 8);
+    const std::uint64_t position = end = little(tail, at - kLocatorBytes + 8, 8);
     if (position > file_bytes || file_bytes - position < record.size() || !read_at(file, position, record)) return std::nullopt;
     const std::string_view text(record.data(), record.size());
     if (!text.starts_with(kEnd64)) return std::nullopt;
     range = {little(text, 48, 8), little(text, 40, 8), little(text, 32, 8)};
+    one_disk = one_disk && little(text, 16, 8) == 0 && little(text, 24, 8) == range.entries &&
+               little(text, 14, 2) <= kMaxVersion && little(tail, at - kLocatorBytes + 4, 4) == 0 &&
+               little(tail, at - kLocatorBytes + 16, 4) == 1;
   }
+  // Nothing is between the directory and the records of its end.
+  if (!one_disk || range.offset + range.bytes != end) return std::nullopt;
   if (range.bytes > std::min(file_bytes, kMaxDirectory) || range.offset > file_bytes - range.bytes) return std::nullopt;
   return range.entries <= range.bytes / kDirectoryHead ? std::optional(range) : std::nullopt;
 }
@@ -161,7 +176,7 @@ std::string read_directory(int file, std::uint64_t file_bytes, std::vector<Conta
   const auto range = find_directory(file, file_bytes);
   if (!range) return "is no ZIP file, or its end is missing";
   std::string text(static_cast<std::size_t>(range->bytes), '\0');
-  if (!read_at(file, range->offset, text)) return "cannot be read";
+  if (!read_at(file, range->offset, text)) return std::string(kUnreadable);
   std::string_view rest = text;
   for (std::uint64_t i = 0; i < range->entries; ++i) {
     if (rest.size() < kDirectoryHead || !rest.starts_with(kInDirectory)) return "its directory is damaged";
@@ -180,10 +195,12 @@ std::string read_directory(int file, std::uint64_t file_bytes, std::vector<Conta
     }
     if (little(rest, 10, 2) != 0 || packed != entry.bytes)
       return fmt::format("{} is compressed; unpack the file and name the folder", entry.name);
+    if (!is_plain(rest, 6) || little(rest, 34, 2) != 0) return "its directory is damaged";
     if (entry.header > range->offset || entry.bytes > range->offset - entry.header) return "its directory is damaged";
     entries.push_back(std::move(entry));
     rest.remove_prefix(next);
   }
+  if (!rest.empty()) return "its directory is damaged";
   std::ranges::sort(entries, {}, &ContainerEntry::header);
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const std::uint64_t limit = i + 1 < entries.size() ? entries[i + 1].header : range->offset, from = entries[i].header;
@@ -234,6 +251,7 @@ std::shared_ptr<const Index> index_of(const std::string& path, int file, const s
     std::ranges::sort(index.entries, {}, &ContainerEntry::name);
     const auto twice = std::ranges::adjacent_find(index.entries, {}, &ContainerEntry::name);
     if (twice != index.entries.end() && index.fault.empty()) index.fault = twice->name + " occurs twice";
+    return index.fault != kUnreadable;
   });
 }
 
@@ -304,9 +322,32 @@ bool is_container(const std::string& path) {
   return is_unfinished(path) || through.index->has_manifest();
 }
 
+bool begins_like_job(const std::string& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  std::array<char, kEntryHead + 8> head{};
+  if (file.get() < 0 || !read_at(file.get(), 0, head)) return false;
+  const std::string_view text(head.data(), head.size()), name = text.substr(kEntryHead);
+  return text.starts_with(kEntry) && (name.starts_with("layers/") || name.starts_with("program/"));
+}
+
 bool is_job_folder(const std::string& path) {
   std::error_code ignored;
   return fs::is_directory(path, ignored) || is_container(path);
+}
+
+std::vector<std::string> misplaced_entries(const std::string& container) {
+  std::vector<std::string> names;
+  const auto entries = read_entries(container);
+  if (!entries) return names;
+  for (const ContainerEntry& entry : *entries) {
+    const std::string_view name = entry.name;
+    const std::size_t slash = name.find('/');
+    const bool of_job = name.starts_with("layers/") || name.starts_with("program/");
+    const bool outside =
+        name.starts_with('/') || name.find("..") != std::string_view::npos || name.find('\\') != std::string_view::npos;
+    if (outside || (of_job && name.find('/', slash + 1) != std::string_view::npos)) names.push_back(entry.name);
+  }
+  return names;
 }
 
 OpenedEntry open_entry(const std::string& path) {

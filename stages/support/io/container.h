@@ -29,8 +29,15 @@ Result<std::vector<ContainerEntry>> read_entries(const std::string& path, std::u
 /// Whether a regular file begins like a container, and has the manifest of a job or is unfinished.
 bool is_container(const std::string& path);
 
+/// Whether a regular file begins like the container of a job, whole or not.
+bool begins_like_job(const std::string& path);
+
 /// Whether a directory or a container is there.
 bool is_job_folder(const std::string& path);
+
+/// The names of entries that are in no folder of a job, but below one or outside of all: "layers/a/b", "../a". Unpackers may
+/// write them anywhere.
+std::vector<std::string> misplaced_entries(const std::string& container);
 
 /// The bytes of an entry in its container.
 struct OpenedEntry {
@@ -52,7 +59,8 @@ bool has_its_sum(const std::string& container, const ContainerEntry& entry);
 /// Whether a path leads through a container, or through the pages of a job, to an entry; its size. cost  some system calls
 std::optional<std::uint64_t> entry_bytes(const std::string& path);
 
-/// The names in a folder, of a directory, a container or the pages of a job, without order; empty if there is none. Of a container files alone.
+/// The names in a folder, of a directory, a container or the pages of a job, without order; empty if there is none. Of a
+/// container files alone.
 std::vector<std::string> names_in_folder(const std::string& folder);
 
 }  // namespace lamina

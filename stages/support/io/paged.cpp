@@ -185,6 +185,7 @@ std::shared_ptr<const PageIndex> page_index(const std::string& path) {
     if (pages) index.pages = std::move(*pages);
     if (!pages) index.pages.fault = pages.error().message;
     index.add_files();
+    return pages.ok();
   });
 }
 

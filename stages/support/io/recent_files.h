@@ -22,7 +22,7 @@ inline bool is_unchanged(const struct stat& now, const struct stat& before) {
 template <class Value>
 class RecentFiles {
  public:
-  /// make(Value&)  reads the file, under a lock
+  /// make(Value&)  reads the file, under a lock; false if it could not: then it is read again next time
   template <class Make>
   std::shared_ptr<const Value> of(const std::string& path, const struct stat& now, const Make& make) {
     const std::lock_guard lock(mutex_);
@@ -31,8 +31,9 @@ class RecentFiles {
     }
     auto made = std::make_shared<Value>();
     made->stamp = now;
-    make(*made);
+    const bool keep = make(*made);
     std::erase_if(recent_, [&](const auto& one) { return one.first == path; });
+    if (!keep) return made;
     if (recent_.size() >= kRecent) recent_.erase(recent_.begin());
     recent_.emplace_back(path, made);
     return made;
