@@ -191,7 +191,7 @@ int run_program(int argument_count, char** arguments, Program program) {
   std::set_terminate(end_without_memory);
   Console console;
   try {
-    if (const Status room = check_address_space(kStartBytes); !room) return console.end(console.complain(room.error()));
+    if (const Status memory = check_address_space(kStartBytes); !memory) return console.end(console.complain(memory.error()));
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
     for (const std::string& left : take_left_behind()) console.say("lamina: note: " + left);
     return console.end(outcome.error ? console.complain(*outcome.error) : outcome.code);

@@ -24,8 +24,10 @@ bool is_settings_name(const std::string& file) { return fs::path(file).filename(
 
 /// A path relative to the watched folder; "" if it is outside.
 std::string below_root(const std::string& path, const std::string& root) {
-  const fs::path base = (fs::path(full_path(root)) / "").parent_path(),
-                 below = fs::path(full_path(path)).lexically_relative(base);
+  std::error_code ignored;
+  const auto real = [&](const std::string& name) { return fs::weakly_canonical(full_path(name), ignored); };
+  const fs::path base = (real(root) / "").parent_path(), file = real(fs::path(path).parent_path()) / fs::path(path).filename(),
+                 below = file.lexically_relative(base);
   return below.empty() || *below.begin() == ".." || below == "." ? "" : below.string();
 }
 

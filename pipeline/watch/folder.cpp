@@ -107,13 +107,14 @@ std::optional<FileStamp> stamp_of(const std::string& path) {
 
 Result<Folder> Folder::open(const std::string& root, std::vector<std::string> skipped) {
   Folder folder(root, std::move(skipped));
-  folder.held_ = ::open(root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder.held_ < 0)
+  struct stat status {};
+  const int reason = ::stat(root.c_str(), &status) != 0 ? errno : S_ISDIR(status.st_mode) ? 0 : ENOTDIR;
+  if (reason != 0)
     return usage("{}: {}; name the folder that is to be watched", root,
-                 errno == ENOTDIR ? "is a file, not a folder" : std::strerror(errno));
-  // File systems that cannot lock a folder have one watcher by agreement.
-  if (is_refused(folder.held_, LOCK_EX))
-    return failure(Fault::kOutput, "{}: another watcher has this folder right now; stop it, or name another folder", root);
+                 reason == ENOTDIR ? "is a file, not a folder" : std::strerror(reason));
+  if (Status held = folder.hold(); !held)
+    return held.error().fault == Fault::kOutput ? held.error()
+                                                : usage("{}: cannot be opened; name the folder that is to be watched", root);
   if (const std::string other = nested_watch(root); !other.empty())
     return usage("{}: another watcher has {}, and their files would be planned twice; stop it, or name a folder next to it",
                  root, other);
@@ -227,7 +228,26 @@ bool Folder::read_folder(const std::string& relative, std::map<std::string, Watc
   return errno == 0;
 }
 
+Status Folder::hold() {
+  struct stat held {
+  }, named{};
+  const bool is_same = held_ >= 0 && ::fstat(held_, &held) == 0 && ::stat(root_.c_str(), &named) == 0 &&
+                       held.st_dev == named.st_dev && held.st_ino == named.st_ino;
+  if (is_same) return {};
+  const int folder = ::open(root_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return failure(Fault::kInput, "{}: {}; waiting for the folder", root_, std::strerror(errno));
+  // File systems that cannot lock a folder have one watcher by agreement.
+  if (is_refused(folder, LOCK_EX)) {
+    ::close(folder);
+    return failure(Fault::kOutput, "{}: another watcher has this folder right now; stop it, or name another folder", root_);
+  }
+  if (held_ >= 0) ::close(held_);
+  held_ = folder;
+  return {};
+}
+
 Status Folder::scan() {
+  if (Status status = hold(); !status) return status;
   std::map<std::string, WatchedFile> found;
   if (!read_folder("", found)) return failure(Fault::kInput, "{}: {}; waiting for the folder", root_, std::strerror(errno));
   files_ = std::move(found);

@@ -56,8 +56,8 @@ class Folder {
   /// Takes the events so far. returns  whether files or folders came, went or were closed
   bool take_events();
 
-  /// Reads the folder. Hidden files and folders, links and files of other names are left out.
-  /// errors  kInput: the folder cannot be read; files() stays as it was
+  /// Reads the folder, also a new one of its name. Hidden files and folders, links and files of other names are left out.
+  /// errors  kInput: the folder cannot be read; kOutput: another process holds the new one; files() stays as it was
   Status scan();
   /// By their names relative to the folder.
   std::map<std::string, WatchedFile>& files() { return files_; }
@@ -75,6 +75,8 @@ class Folder {
  private:
   enum class Event { kChanged, kClosed, kRenamed };
   Folder(std::string root, std::vector<std::string> skipped) : root_(std::move(root)), skipped_(std::move(skipped)) {}
+  /// Locks the folder of the name, if it is not the one that is locked. errors  of scan()
+  Status hold();
   bool read_folder(const std::string& relative, std::map<std::string, WatchedFile>& found);
   void add_events(const std::string& relative);
   void take_file(const std::string& relative, std::map<std::string, WatchedFile>& found);

@@ -28,6 +28,9 @@ void choose_stem(WatchedJob& job);
 /// The final path of the result, of the error of a failed job, or "".
 std::string result_path(const WatchedJob& job);
 
+/// Whether the result of a planned job is neither in its work folder nor at its name: the output directory was replaced.
+bool is_lost(const WatchedJob& job);
+
 /// Moves the result of a planned job from its work folder to its name, or writes its error, and removes the work folder. May be
 /// repeated after a kill.
 /// again    records the job once more, when its name was taken meanwhile

@@ -60,7 +60,9 @@ bool take_inputs(const WatchShared& shared, WatchedJob& job) {
   }
   job.id = hash_text(identity);
   for (const std::string& word : job.words) identity += fmt::format("{}:{}\n", word.size(), word);
-  job.work = joined(job.root, ".watch/" + hex(hash_text(identity + std::string(version()))));
+  // Another watcher of equal parts may have the same root.
+  job.work =
+      joined(job.root, fmt::format(".watch/{}", hex(hash_text(shared.record->id() + identity + std::string(version())))));
   return are_unchanged(shared, job, false);
 }
 
@@ -110,6 +112,16 @@ bool recorded(WatchTask& task, const Status& status) {
   return false;
 }
 
+/// Whether a job failed by a fault of the machine, after which it is planned again: a full disk, or up to three times too
+/// little memory, which the job itself may exhaust.
+bool is_passing(WatchTask& task) {
+  constexpr int kTries = 3;
+  const int code = task.job.result.code;
+  if (task.call.refused || task.cancel) return false;
+  if (code == static_cast<int>(Fault::kOutput)) return true;
+  return code == static_cast<int>(Fault::kMemory) && ++task.shortages < kTries;
+}
+
 /// returns  whether the job is planned; else task.end states why it is not
 bool plan(WatchShared& shared, WatchTask& task) {
   WatchedJob& job = task.job;
@@ -134,6 +146,12 @@ bool plan(WatchShared& shared, WatchTask& task) {
   if (task.cancel && job.result.code != 0)
     fail(job, {Fault::kInput, fmt::format("took longer than its time limit of {} s", shared.time_limit_seconds)});
   const bool unchanged = are_unchanged(shared, job, true);
+  if (unchanged && is_passing(task)) {
+    task.end = End::kRetry;
+    task.problem = Error{static_cast<Fault>(job.result.code),
+                         fmt::format("{}: {}", path_in(shared, job.inputs.front()), job.result.reason)};
+    return false;
+  }
   const std::lock_guard lock(shared.mutex);
   if (!unchanged) {
     remove_work(job.work);
@@ -173,6 +191,14 @@ Status move_inputs(WatchShared& shared, WatchedJob& job) {
 /// Publishes, moves and runs the command. errors  kOutput; kInternal: the command cannot be started
 Status end_job(WatchShared& shared, WatchTask& task) {
   WatchedJob& job = task.job;
+  if (!job.moved && is_lost(job)) {
+    const std::lock_guard lock(shared.mutex);
+    if (!recorded(task, shared.record->dropped(job))) return {};
+    task.end = End::kChanged;
+    task.problem = Error{Fault::kOutput, fmt::format("{}: the result is gone; {} is planned again, if it is there",
+                                                     result_path(job), path_in(shared, job.inputs.front()))};
+    return {};
+  }
   if (!job.moved) {
     {
       const std::lock_guard lock(shared.mutex);
@@ -219,6 +245,10 @@ void prepare_task(const Candidate& candidate, Folder& folder, std::uint64_t laye
                  .lexically_relative(candidate.settings.folder.empty() ? "." : candidate.settings.folder)
                  .string();
   if (candidate.settings.folder.empty()) job.name = job.part.substr(0, job.part.size() - ending.size());
+  // Its files have endings, numbers and names of unfinished files, each up to 255 bytes long.
+  constexpr std::size_t kMaxName = 200;
+  const fs::path name(job.name);
+  job.name = joined(name.parent_path(), short_name(name.filename(), kMaxName));
   task.need_bytes = kFixedBytes;
   for (const std::string& file : candidate.inside) {
     const FileStamp& stamp = folder.files().at(file).stamp;

@@ -37,12 +37,13 @@ struct WatchTask {
     kEnded,    // recorded as ended
     kChanged,  // an input changed: nothing is left of the job
     kStopped,  // continues with the next run
-    kRetry     // planned, but not published, moved or ended; see `problem`
+    kRetry     // planned, but not published, moved or ended, or not planned for lack of space; see `problem`
   };
   End end = End::kStopped;
   std::optional<Error> problem;
   std::optional<int> then_code;
   bool fatal = false;  // the record cannot be written
+  int shortages = 0;   // of memory, so far
 };
 
 /// Reads the command line of a candidate; its error becomes that of the job. Reads no part.

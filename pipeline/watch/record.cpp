@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 #include <filesystem>
+#include <random>
 #include <utility>
 
 #include "pipeline/job/errors.h"
@@ -32,6 +33,11 @@ std::string time_text() {
   ::gmtime_r(&seconds, &date);
   return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:03}Z", date.tm_year + 1900, date.tm_mon + 1, date.tm_mday,
                      date.tm_hour, date.tm_min, date.tm_sec, ms % 1000);
+}
+
+std::string random_id() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
 }
 
 Json input_json(const WatchedInput& input) {
@@ -66,19 +72,24 @@ void read_begun(const Json& json, WatchedJob& job) {
 
 Result<WatchRecord> WatchRecord::open(const std::string& directory, const std::string& root) {
   std::error_code error;
+  for (const std::string& name : {directory, root}) {
+    if (!is_utf8(fs::weakly_canonical(name, error).string()))
+      return usage("{}: its path is not in UTF-8, which the record of a watcher cannot contain; rename it", one_line(name));
+  }
   fs::create_directories(directory, error);
   if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
   const std::string path = (fs::path(directory) / "watch.jsonl").string();
   auto journal = Journal::open(path, "another watcher is running here right now; stop it or name another directory");
   if (!journal) return journal.error();
-  WatchRecord record(std::move(*journal));
+  WatchRecord record(std::move(*journal), path);
   const Status read = record.journal_.read([&](const std::string& line, std::uint64_t) { record.read_line(line); });
   if (!read) return read.error();
   const std::string folder = fs::weakly_canonical(root, error).string();
   if (!record.folder_.empty() && record.folder_ != folder)
     return usage("{}: belongs to the watched folder {}; name another directory with -o", path, one_line(record.folder_));
-  const std::string started =
-      json_line({{"event", "started"}, {"time", time_text()}, {"folder", folder}, {"version", version()}});
+  if (record.id_.empty()) record.id_ = random_id();
+  const std::string started = json_line(
+      {{"event", "started"}, {"time", time_text()}, {"record", record.id_}, {"folder", folder}, {"version", version()}});
   if (fs::file_size(path, error) > kMaxBytes &&
       record.journal_.replace(started + record.unfinished_lines(), (fs::path(directory) / "watch.old.jsonl").string()))
     return record;
@@ -103,6 +114,7 @@ void WatchRecord::read_line(const std::string& line) try {
   const std::string& event = json.at("event").text();
   if (event == "started") {
     folder_ = json.at("folder").text();
+    if (const Json* id = json.find("record")) id_ = id->text();
     return;
   }
   const std::string& id = json.at("id").text();
@@ -125,6 +137,10 @@ void WatchRecord::read_line(const std::string& line) try {
     job.result.reason = json.at("reason").text();
     job.result.seconds = json.at("seconds").get<double>();
     job.stem = json.at("stem").text();
+    json.at("files").get_to(job.result.output.files);
+    json.at("bytes").get_to(job.result.output.bytes);
+    if (!read_hex(json.at("hash").text(), job.result.output.hash)) throw JsonError("hash");
+    job.result.value = json.at("result");
     job.planned = true;
     begun_work_.erase(job.part);
   } else if (event == "moved") {
@@ -151,6 +167,8 @@ std::vector<WatchedJob> WatchRecord::take_unfinished() {
 }
 
 Status WatchRecord::append(const char* event, const WatchedJob& job, const Json& more) {
+  if (!journal_.has_its_name())
+    return failure(Fault::kOutput, "{}: was removed or replaced while the watcher ran; start it again", path_);
   Json line = {{"event", event}, {"time", time_text()}, {"part", job.part}, {"id", hex(job.id)}};
   line.update(more);
   return journal_.append(json_line(line));

@@ -54,15 +54,17 @@ class WatchRecord {
  public:
   /// Opens directory/watch.jsonl, creates both if absent, and reads what is unfinished. A file of more than 16 MiB is replaced
   /// by the lines of that, and becomes watch.old.jsonl. errors  kOutput: another watcher holds it, or the system's reason.
-  /// kUsage: it belongs to another watched folder
+  /// kUsage: it belongs to another watched folder, or a name is not in UTF-8, which it cannot contain
   static Result<WatchRecord> open(const std::string& directory, const std::string& root);
 
+  /// Of this record alone, from its first run on; other watchers may write to the same folders.
+  const std::string& id() const { return id_; }
   /// Jobs that were planned, and are to be moved or to run their command; in the order of their begin. To be called once.
   std::vector<WatchedJob> take_unfinished();
   /// Work folders of jobs that begun and were not planned, by the name of the part.
   std::map<std::string, std::string>& begun_work() { return begun_work_; }
 
-  // --- from one thread at a time; errors  kOutput
+  // --- from one thread at a time; errors  kOutput, also if the record was removed or replaced
   Status begun(const WatchedJob& job);
   Status dropped(const WatchedJob& job);
   Status planned(const WatchedJob& job);
@@ -71,12 +73,13 @@ class WatchRecord {
   Status ended(const WatchedJob& job, std::optional<int> then_code);
 
  private:
-  explicit WatchRecord(Journal journal) : journal_(std::move(journal)) {}
+  WatchRecord(Journal journal, std::string path) : journal_(std::move(journal)), path_(std::move(path)) {}
   void read_line(const std::string& line);
   std::string unfinished_lines() const;
   Status append(const char* event, const WatchedJob& job, const Json& more);
 
   Journal journal_;
+  std::string path_, id_;
   std::string folder_;                             // the watched one, of the last run
   std::vector<std::string> order_;                 // ids
   std::map<std::string, WatchedJob> jobs_;         // by id

@@ -102,7 +102,9 @@ class FolderWatcher {
     if (!summary_.abandoned) shared.record.reset();  // the next run may open it at once
     summary_.problem = fatal_;
     summary_.left = candidates_.left;
-    if (summary_.left == Fault::kInterrupted && !waiting_.empty()) summary_.left = Fault::kOutput;
+    for (const Waiting& one : waiting_) {
+      if (summary_.left == Fault::kInterrupted) summary_.left = one.task->problem ? one.task->problem->fault : Fault::kOutput;
+    }
     return summary_;
   }
 
@@ -232,11 +234,12 @@ class FolderWatcher {
     if (task->fatal && !fatal_) fatal_ = *task->problem;
     if (task->end == End::kRetry && !task->fatal) {
       if (task->problem) report_problem(*task);
-      task->need_bytes = 0;
+      if (task->job.planned) task->need_bytes = 0;
       return waiting_.push_back({task, Clock::now() + kRetryAfter});
     }
     active_.erase(task->job.part);
     problems_.erase(task->job.part);
+    if (task->end != End::kEnded && task->problem) observer_.note(task->problem->message);
     if (task->end != End::kEnded) return;
     const int code = task->job.result.code;
     ++(code == 0 ? summary_.done : summary_.failed);

@@ -95,6 +95,13 @@ Journal::~Journal() {
   }
 }
 
+bool Journal::has_its_name() const {
+  struct stat own {
+  }, named{};
+  return ::fstat(file_, &own) == 0 && ::stat(path_.c_str(), &named) == 0 && own.st_dev == named.st_dev &&
+         own.st_ino == named.st_ino;
+}
+
 bool Journal::empty() const {
   std::error_code ignored;
   return std::filesystem::file_size(path_, ignored) == 0;

@@ -33,6 +33,8 @@ class Journal {
   ~Journal();
 
   bool empty() const;
+  /// Whether its name still leads to this file. cost  two system calls
+  bool has_its_name() const;
   /// Empties the file. errors  kOutput
   Status clear();
   /// Replaces the file by another one with these lines, in one step: a kill leaves the one or the other. The old one gets the

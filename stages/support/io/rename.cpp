@@ -9,9 +9,13 @@
 
 namespace lamina {
 
+int rename_in_one_step(const std::string& from, const std::string& to) {
+  return ::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
+}
+
 int rename_new(const std::string& from, const std::string& to) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
-  return errno == EINVAL || errno == ENOSYS ? rename_new_by_link(from, to) : errno;
+  const int reason = rename_in_one_step(from, to);
+  return reason == EINVAL || reason == ENOSYS ? rename_new_by_link(from, to) : reason;
 }
 
 int rename_new_by_link(const std::string& from, const std::string& to) {

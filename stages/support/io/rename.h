@@ -9,6 +9,8 @@ namespace lamina {
 /// name and remove the old one; directories, and all files where there are no links, are checked first.
 /// returns  0, EEXIST if `to` exists, or the system's error number
 int rename_new(const std::string& from, const std::string& to);
+/// The same in one step. returns  EINVAL or ENOSYS where the system cannot do that
+int rename_in_one_step(const std::string& from, const std::string& to);
 /// The same where the system cannot do it in one step.
 int rename_new_by_link(const std::string& from, const std::string& to);
 

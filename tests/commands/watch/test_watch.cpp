@@ -449,6 +449,126 @@ TEST_F(WatchedFolder, EveryStepOfAKilledWatcherIsContinued) {
   }
 }
 
+/// The record up to the first event of a kind, as a kill leaves it.
+std::string record_up_to(const std::string& text, const std::string& event) {
+  const std::size_t at = text.find("\"event\":\"" + event + "\"");
+  return text.substr(0, text.find('\n', at) + 1);
+}
+
+TEST_F(WatchedFolder, APartWhoseResultIsLostIsPlannedAgain) {
+  put_box("in/a.stl");
+  ASSERT_EQ(watch().code, 0);
+  const std::string whole = tree_text(directory_ / "out/a");
+  // Killed before the result was published; then the output directory is renamed, and the work folder is elsewhere.
+  const std::string work = events("begun")[0]["work"];
+  write_text(directory_ / "out/watch.jsonl", record_up_to(read_text(directory_ / "out/watch.jsonl"), "planned"));
+  fs::create_directories(work);
+  fs::rename(directory_ / "out/a", work + "/a");
+  fs::rename(directory_ / "in/done/a.stl", directory_ / "in/a.stl");
+  fs::rename(directory_ / "out", directory_ / "other");
+  const Outcome again = watch({"-o", "other"});
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_NE(again.err.find("the result is gone"), std::string::npos) << again.err;
+  EXPECT_TRUE(tree_text(directory_ / "other/a") == whole);
+  EXPECT_TRUE(has("in/done/a.stl"));
+}
+
+TEST_F(WatchedFolder, AContinuedJobReportsItsFiles) {
+  put_box("in/a.stl");
+  ASSERT_EQ(watch().code, 0);
+  const Json planned = events("planned")[0];
+  write_text(directory_ / "out/watch.jsonl", record_up_to(read_text(directory_ / "out/watch.jsonl"), "moved"));
+  const Json job = Json::parse(watch({"--json"}).out);
+  for (const char* name : {"files", "bytes", "hash"}) EXPECT_EQ(job[name], planned[name]) << job;
+  EXPECT_GT(job["files"], 0);
+}
+
+TEST_F(WatchedFolder, AFolderThatCannotBeWrittenToIsWaitedFor) {
+  put_box("in/a.stl");
+  write_text(directory_ / "in/watch.toml", "output = \"/proc/no folder\"\n");
+  const Outcome refused = watch();
+  EXPECT_EQ(refused.code, 4) << refused.err;
+  EXPECT_EQ(files_below(directory_ / "in"), (Words{"a.stl", "watch.toml"}));
+  EXPECT_TRUE(events("planned").empty());
+  EXPECT_NE(refused.err.find("in/a.stl: "), std::string::npos) << refused.err;
+  fs::remove(directory_ / "in/watch.toml");
+  EXPECT_EQ(watch().code, 0);
+  EXPECT_EQ(files_below(directory_ / "in"), Words{"done/a.stl"});
+}
+
+TEST_F(WatchedFolder, ResultsOfTwoWatchersWithOneRootAreWhole) {
+  for (const char* watcher : {"a", "b"}) {
+    const std::string own = directory_ / watcher;
+    fs::create_directories(own + "/in");
+    put_box(std::string(watcher) + "/in/part.stl", 10);
+    write_text(own + "/in/watch.toml", "output = \"" + (directory_ / "shared") + "\"\n");
+    fs::last_write_time(own + "/in/part.stl", fs::file_time_type::clock::now() - std::chrono::hours(1));
+  }
+  fs::last_write_time(directory_ / "b/in/part.stl", fs::last_write_time(directory_ / "a/in/part.stl"));
+  const auto run = [&](const char* watcher) {
+    return run_lamina(
+        {"watch", "in", "-o", "out", "--once", "--settle", "0.05", "--with", "jet --bed 20x20 --dpi 600 --layer 0.02"},
+        directory_ / watcher);
+  };
+  Outcome other;
+  std::thread second([&] { other = run("b"); });
+  const Outcome one = run("a");
+  second.join();
+  EXPECT_EQ(one.code + other.code, 0) << one.err << other.err;
+  for (const char* name : {"shared/part", "shared/part-2"})
+    EXPECT_EQ(run_lamina({"verify", name}, directory_.path()).code, 0) << name;
+}
+
+TEST_F(WatchedFolder, AFolderThatIsMadeAnewIsHeldToo) {
+  const Outcome outcome = watch({}, [&](int) {
+    EXPECT_TRUE(wait_for("out/watch.jsonl"));
+    fs::remove_all(directory_ / "in");
+    fs::create_directories(directory_ / "in");
+    put_box("in/a.stl");
+    EXPECT_TRUE(wait_for("in/done/a.stl"));
+    EXPECT_EQ(run_lamina({"watch", "in", "-o", "second", "--once"}, directory_.path()).code, 4);
+    fs::remove_all(directory_ / "out");
+    put_box("in/b.stl");  // its record cannot be written: the watcher ends
+  });
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_NE(outcome.err.find("was removed or replaced"), std::string::npos) << outcome.err;
+}
+
+TEST_F(WatchedFolder, LongNamesAreShortened) {
+  const std::string name(248, 'x');
+  for (int copy = 0; copy < 2; ++copy) {
+    put_box("in/" + name + ".stl", copy == 0 ? 2 : 3);
+    write_text(directory_ / ("in/" + std::string(247, 'y') + ".obj"), "v 0 0 0\nf 1 2 3\n");
+    EXPECT_EQ(watch({"--with", copy == 0 ? "jet --bed 20x20 --dpi 100 --layer 0.5" : "extrude --layer 0.2"}).code, 3);
+  }
+  int done = 0, failed = 0;
+  for (const std::string& file : files_below(directory_ / "in")) ++(file.starts_with("done/") ? done : failed);
+  EXPECT_EQ(done, 2);
+  EXPECT_EQ(failed, 2);
+}
+
+TEST_F(WatchedFolder, NamesThatARecordCannotContainAreRefused) {
+  fs::create_directories(directory_ / "in\xff");
+  for (const Words& words :
+       {Words{"watch", "in\xff", "-o", "out", "--once"}, Words{"watch", "in", "-o", "out\xfe", "--once"}}) {
+    const Outcome refused = run_lamina(words, directory_.path());
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_NE(refused.err.find("not in UTF-8"), std::string::npos) << refused.err;
+  }
+}
+
+TEST_F(WatchedFolder, ALinkToTheFolderLeadsToTheSameParts) {
+  fs::create_symlink("in", directory_ / "link");
+  put_box("in/a.stl");
+  write_text(directory_ / "in/job.toml", "[[part]]\npath = \"" + (directory_ / "in/a.stl") + "\"\n");
+  const Outcome outcome = run_lamina(
+      {"watch", "link", "-o", "out", "--once", "--settle", "0.05", "--with", "jet --bed 20x20 --dpi 100 --layer 0.5"},
+      directory_.path());
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(has("out/job/manifest.json"));
+  EXPECT_FALSE(has("out/a"));
+}
+
 TEST_F(WatchedFolder, ALongRecordIsReplacedByWhatIsUnfinished) {
   put_box("in/a.stl");
   put_box("in/b.stl");
