@@ -219,8 +219,7 @@ Status merge_shares(const BatchDirectory& batch, std::int64_t schema, const File
   // First the plan: without it the directory is that of an undivided batch.
   std::error_code error;
   fs::remove(plan_path(batch.directory), error);
-  if (error) return failure(Fault::kOutput, "{}: {}", plan_path(batch.directory), error.message());
-  return remove_shares(batch.directory);
+  return error ? Status(failure(Fault::kOutput, "{}: {}", plan_path(batch.directory), error.message())) : Status();
 }
 
 }  // namespace lamina::pipeline

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -278,6 +279,60 @@ TEST_F(BatchInShares, AShareThatStartsAsItsPlanIsMergedIsRefused) {
   EXPECT_EQ(started.error_lines(), 1u) << started.err;
   EXPECT_NE(started.err.find("were merged or planned again"), std::string::npos) << started.err;
   EXPECT_GT(fs::file_size(record), 0u);
+}
+
+/// The lock of a plan, as a process that plans or merges shares has it.
+class PlanHeld {
+ public:
+  explicit PlanHeld(const fs::path& directory) : name_(directory / "shares.tsv.lamina-aaaaaaaaaaaaa.part") {
+    fs::create_directories(directory);
+    write_text(name_, "");
+    file_ = ::open(name_.c_str(), O_RDWR | O_CLOEXEC);
+    EXPECT_EQ(::flock(file_, LOCK_EX | LOCK_NB), 0);
+  }
+  PlanHeld(const PlanHeld&) = delete;
+  PlanHeld& operator=(const PlanHeld&) = delete;
+  ~PlanHeld() {
+    fs::remove(name_);
+    ::close(file_);
+  }
+
+ private:
+  std::string name_;
+  int file_ = -1;
+};
+
+TEST_F(BatchInShares, PlannedAndRunWhileABatchWithoutSharesPreparesTheyStay) {
+  write_list();
+  for (const char* shard : {"1/2", "2/2"}) share(shard);
+  fs::rename(directory_ / "out", directory_ / "ready");
+  Outcome undivided;
+  std::optional<PlanHeld> held(directory_ / "out");
+  std::thread process([&] { undivided = lamina({"batch", "jobs.txt", "-o", "out", "--quiet"}); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));  // it has found no plan and waits for the lock
+  for (const auto& entry : fs::directory_iterator(directory_ / "ready"))
+    fs::rename(entry.path(), directory_ / "out" / entry.path().filename());
+  held.reset();
+  process.join();
+  EXPECT_EQ(undivided.code, 2) << undivided.err;
+  EXPECT_NE(undivided.err.find("out/shares.tsv: belongs to a batch in shares"), std::string::npos) << undivided.err;
+  EXPECT_FALSE(fs::exists(directory_ / "out/batch.jsonl"));
+  EXPECT_EQ(lamina({"batch", "out", "--status"}).code, 3);
+}
+
+TEST_F(BatchInShares, AShareThatStartsAsAMergeEndsDividesNothingAgain) {
+  write_list();
+  ASSERT_EQ(lamina({"batch", "jobs.txt", "-o", "whole", "--quiet"}).code, 3);
+  Outcome started;
+  std::optional<PlanHeld> held(directory_ / "out");
+  std::thread process([&] { started = share("2/2", {"--resume"}); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));  // it has found no batch and waits for the lock
+  fs::copy(directory_ / "whole/batch.jsonl", directory_ / "out/batch.jsonl");
+  held.reset();
+  process.join();
+  EXPECT_EQ(started.code, 2) << started.err;
+  EXPECT_NE(started.err.find("out/batch.jsonl: belongs to a batch without shares"), std::string::npos) << started.err;
+  EXPECT_EQ(files_of_batch("out"), Words{"batch.jsonl"});
 }
 
 TEST_F(BatchInShares, MergeNamesWhatIsMissingAndWritesNothing) {
