@@ -104,6 +104,7 @@ class DryRuns {
     BatchJob dry;
     dry.entry.words = words;
     dry.parsed = call->parsed;
+    dry.parsed = without_outputs(dry);
     CallSettings settings;
     settings.layer_bytes = job.layer_bytes;
     const double start = process_seconds();

@@ -428,6 +428,17 @@ TEST_F(BatchInShares, ForSlurmStandardInputIsRefusedInOneLine) {
   EXPECT_EQ(read_text(err), "scripts/cluster/slurm_batch: -: the tasks cannot read standard input; write the list to a file\n");
 }
 
+TEST_F(BatchInShares, PlanSharesWritesNoFilesThatJobsName) {
+  write_boxes(1);
+  write_text(directory_ / "jobs.txt", "jet part10.stl --layer 0.5 --machine jet1000 --quote q.csv --save-job=s.toml -o a\n");
+  EXPECT_EQ(lamina({"batch", "jobs.txt", "-o", "out", "--plan-shares", "2", "--quiet"}).code, 0);
+  EXPECT_FALSE(fs::exists(directory_ / "q.csv"));
+  EXPECT_FALSE(fs::exists(directory_ / "s.toml"));
+  EXPECT_EQ(share("1/2").code + share("2/2").code, 0);
+  EXPECT_TRUE(fs::exists(directory_ / "q.csv"));
+  EXPECT_TRUE(fs::exists(directory_ / "s.toml"));
+}
+
 TEST_F(BatchInShares, PlanSharesEstimatesByDryRunsAndRunsNoJob) {
   write_boxes(2);
   write_text(
