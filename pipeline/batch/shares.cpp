@@ -300,15 +300,14 @@ std::vector<std::uint64_t> SharePlan::costs() const {
   return sums;
 }
 
-Hash128 words_hash(const BatchJob& job) { return hash_text(fmt::format("{}\n{}", job.entry.words.text(), job.position())); }
-
 SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
                       const std::vector<std::string>& with, std::string_view unit) {
   SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), {}, {}};
   const std::vector<DividedJob> divided = divide_jobs(costs, shares);
   plan.jobs.reserve(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i)
-    plan.jobs.push_back({divided[i].share, divided[i].cost, words_hash(jobs[i]), table_cell(jobs[i].entry.source)});
+    plan.jobs.push_back(
+        {divided[i].share, divided[i].cost, hash_text(jobs[i].entry.words.text()), table_cell(jobs[i].entry.source)});
   return plan;
 }
 

@@ -52,7 +52,7 @@ inline constexpr std::string_view kPlannedUnit = "microseconds";  // of costs by
 struct PlannedJob {
   std::uint32_t share = 0;  // from 1
   std::uint64_t cost = 0;
-  Hash128 words;       // of its words and its output
+  Hash128 words;       // of its words in the list
   std::string source;  // "jobs.txt:12"
 };
 
@@ -71,9 +71,6 @@ struct SharePlan {
 
 SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
                       const std::vector<std::string>& with, std::string_view unit);
-
-/// Hash of the words and the output of a job.
-Hash128 words_hash(const BatchJob& job);
 
 /// DIR/shares.tsv
 std::string plan_path(const std::string& directory);
