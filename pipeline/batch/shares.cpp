@@ -30,9 +30,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kFirstLine = "lamina shares\t2\n", kColumns = "job\tshare\tcost\twords\tsource\n", kEnd = "end\t";
-constexpr std::uint64_t kStartBytes = 64 << 10;  // what it costs to start a job, in bytes of a part
-constexpr std::uint64_t kMaxShares = 1'000'000;  // of read_shard()
+constexpr std::string_view kFirstLine = "lamina shares\t3\n", kColumns = "job\tshare\tcost\twords\tsource\n", kEnd = "end\t";
+constexpr std::string_view kYes = "yes", kNo = "no";  // of the line `overwrite`
+constexpr std::uint64_t kStartBytes = 64 << 10;       // what it costs to start a job, in bytes of a part
+constexpr std::uint64_t kMaxShares = 1'000'000;       // of read_shard()
 
 /// Cost of loading each part.
 using Loads = std::map<Hash128, std::uint64_t, HashOrder>;
@@ -144,8 +145,9 @@ bool read_planned_job(std::string_view line, std::size_t number, const SharePlan
 }
 
 std::string plan_text(const SharePlan& plan) {
-  std::string text = fmt::format("{}version\t{}\ngeneration\t{}\nshares\t{}\nwith\t{}\nunit\t{}\n{}", kFirstLine, plan.version,
-                                 hex(plan.generation), plan.shares, plan.with, plan.unit, kColumns);
+  std::string text =
+      fmt::format("{}version\t{}\ngeneration\t{}\nshares\t{}\nwith\t{}\nunit\t{}\noverwrite\t{}\n{}", kFirstLine, plan.version,
+                  hex(plan.generation), plan.shares, plan.with, plan.unit, plan.overwrite ? kYes : kNo, kColumns);
   for (std::size_t i = 0; i < plan.jobs.size(); ++i) {
     const PlannedJob& job = plan.jobs[i];
     text += fmt::format("{}\t{}\t{}\t{}\t{}\n", i + 1, job.share, job.cost, hex(job.words), job.source);
@@ -302,7 +304,7 @@ std::vector<std::uint64_t> SharePlan::costs() const {
 
 SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
                       const std::vector<std::string>& with, std::string_view unit) {
-  SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), {}, {}};
+  SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), false, {}, {}};
   const std::vector<DividedJob> divided = divide_jobs(costs, shares);
   plan.jobs.reserve(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i)
@@ -330,14 +332,16 @@ Result<SharePlan> read_plan(const std::string& directory) {
   SharePlan plan;
   std::uint64_t shares = 0;
   const auto version_text = take_value(text, "version"), generation = take_value(text, "generation"),
-             count = take_value(text, "shares"), with = take_value(text, "with"), unit = take_value(text, "unit");
-  if (!version_text || !generation || !count || !with || !unit || !read_hex(*generation, plan.generation) ||
-      !read_count(*count, kMaxShares, shares) || shares == 0)
+             count = take_value(text, "shares"), with = take_value(text, "with"), unit = take_value(text, "unit"),
+             overwrite = take_value(text, "overwrite");
+  if (!version_text || !generation || !count || !with || !unit || (overwrite != kYes && overwrite != kNo) ||
+      !read_hex(*generation, plan.generation) || !read_count(*count, kMaxShares, shares) || shares == 0)
     return damaged_plan(path);
   plan.shares = static_cast<std::uint32_t>(shares);
   plan.version = *version_text;
   plan.with = *with;
   plan.unit = *unit;
+  plan.overwrite = overwrite == kYes;
   if (!text.starts_with(kColumns)) return damaged_plan(path);
   text.remove_prefix(kColumns.size());
   while (!text.empty()) {

@@ -59,10 +59,11 @@ struct PlannedJob {
 /// The plan: docs/reference/formats.md describes the file.
 struct SharePlan {
   std::uint32_t shares = 0;
-  std::string version;  // of lamina
-  std::string with;     // words of --with, as JSON
-  std::string unit;     // of the costs: kPlannedUnit or another one
-  Hash128 generation;   // repeated by the records of the shares; set by agree_on_plan()
+  std::string version;     // of lamina
+  std::string with;        // words of --with, as JSON
+  std::string unit;        // of the costs: kPlannedUnit or another one
+  bool overwrite = false;  // what is where the jobs write is replaced by the share that has not begun them yet
+  Hash128 generation;      // repeated by the records of the shares; set by agree_on_plan()
   std::vector<PlannedJob> jobs;
 
   /// Sums of the costs of all shares.

@@ -40,7 +40,7 @@ Status read_undivided(BatchDirectory& batch) {
     last = std::max<std::size_t>(last, job.job.number);
     if (job.ended) add_ended(std::move(job), state, batch);
   }
-  // A list that was shortened before --resume leaves more jobs in the record.
+  // A record whose first line was lost or is of an earlier version may have more jobs.
   state.jobs = std::max(record->planned > 0 ? record->planned : last, state.done + state.failed);
   batch.states.push_back(state);
   return {};

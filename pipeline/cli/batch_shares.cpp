@@ -162,7 +162,7 @@ Result<std::vector<BatchJob>> prepare_undivided(std::vector<BatchEntry> entries,
   Result<BatchRecord> opened = BatchRecord::open(options.files(), options.resume, options.overwrite);
   if (!opened) return opened.error();
   record.emplace(std::move(*opened));
-  const Status planned = record->planned(jobs->size());
+  const Status planned = record->planned(*jobs, options.overwrite);
   return planned ? std::move(jobs) : planned.error();
 }
 
@@ -172,7 +172,8 @@ Result<std::vector<BatchJob>> prepare_share(std::vector<BatchEntry> entries, con
   std::vector<CostedJob> costs;
   auto jobs = prepare_list(std::move(entries), share, options, costs);
   if (!jobs) return jobs.error();
-  const SharePlan own = plan_shares(*jobs, costs, options.shares, with, kFileUnit);
+  SharePlan own = plan_shares(*jobs, costs, options.shares, with, kFileUnit);
+  own.overwrite = options.overwrite;
   const Result<SharePlan> plan = agree_on_plan(options.directory, own, options.overwrite);
   if (!plan) return plan.error();
   const auto check = [&] { return check_same_plan(options.directory, *plan); };
@@ -184,7 +185,8 @@ Result<std::vector<BatchJob>> prepare_share(std::vector<BatchEntry> entries, con
     if (plan->jobs[i].share == options.share) chosen.push_back(std::move((*jobs)[i]));
   }
   identify_jobs(chosen, share, read_call);
-  return chosen;
+  const Status planned = record->planned(chosen, options.overwrite || plan->overwrite);
+  return planned ? Result<std::vector<BatchJob>>(std::move(chosen)) : planned.error();
 }
 
 Result<SharePlan> plan_by_dry_runs(std::vector<BatchEntry> entries, const BatchShare& share, const BatchOptions& options,
@@ -203,7 +205,9 @@ Result<SharePlan> plan_by_dry_runs(std::vector<BatchEntry> entries, const BatchS
     progress(i + 1);
   }
   if (Status status = options.overwrite ? replace_shares(options.directory) : Status(); !status) return status.error();
-  return agree_on_plan(options.directory, plan_shares(*jobs, costs, options.shares, with, kPlannedUnit), options.overwrite);
+  SharePlan plan = plan_shares(*jobs, costs, options.shares, with, kPlannedUnit);
+  plan.overwrite = options.overwrite;
+  return agree_on_plan(options.directory, plan, options.overwrite);
 }
 
 }  // namespace lamina::pipeline
