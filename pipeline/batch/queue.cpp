@@ -279,13 +279,20 @@ class Queue : public std::enable_shared_from_this<Queue> {
         return result ? std::move(*result) : failed(result.error());
       }
     }
-    const bool unowned = !options_.overwrite && (earlier == nullptr || earlier->unowned) && holds_something(job.output);
+    const bool unowned = !replaces_ && (earlier == nullptr || earlier->unowned) && holds_something(job.output);
     {
       const std::lock_guard lock(mutex_);
       note(record_.begun(job, unowned));
     }
     const bool synced_later = syncs_in_group(job);
-    BatchResult result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, unowned), synced_later});
+    CallSettings settings{job.output, job.layer_bytes, earlier_of(job, earlier, unowned), synced_later};
+    BatchResult result = run_call(job, slot, settings);
+    const bool continued = settings.earlier == CallSettings::Earlier::kContinue && !earlier_ended(earlier);
+    if (replaces_ && continued && job.can_replace && result.code == static_cast<int>(Fault::kUsage)) {
+      // It was killed before it had replaced what was there.
+      settings.earlier = CallSettings::Earlier::kReplace;
+      result = run_call(job, slot, settings);
+    }
     result.unsynced = synced_later;
     result.recognized = result.recognized && unowned && result.outcome == BatchOutcome::kDone;
     if (result.outcome == BatchOutcome::kDone && !job.output.empty() && !result.digested) {
@@ -302,9 +309,11 @@ class Queue : public std::enable_shared_from_this<Queue> {
   CallSettings::Earlier earlier_of(const BatchJob& job, const BatchRecord::Earlier* earlier, bool unowned) const {
     const bool same = earlier != nullptr && earlier->begun == job.id;
     if (job.can_continue && (unowned ? options_.resume : same)) return CallSettings::Earlier::kContinue;
-    if (!unowned && job.can_replace && (options_.overwrite || earlier != nullptr)) return CallSettings::Earlier::kReplace;
+    if (!unowned && job.can_replace && (replaces_ || earlier != nullptr)) return CallSettings::Earlier::kReplace;
     return CallSettings::Earlier::kNone;
   }
+
+  static bool earlier_ended(const BatchRecord::Earlier* earlier) { return earlier != nullptr && earlier->ended; }
 
   static BatchResult failed(const Error& error, BatchResult result = {}) {
     result.outcome = BatchOutcome::kFailed;
@@ -342,6 +351,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
   BatchRecord record_;
   BatchOptions options_;
   RunJob run_;
+  const bool replaces_ = options_.overwrite || record_.replaces();
 
   std::atomic<std::int64_t> last_trim_{0};
   std::mutex mutex_;

@@ -37,9 +37,17 @@ std::string output_in(const Json& entry) {
 }
 
 /// Reads one line of the file; nothing if it is incomplete.
-void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, BatchRecord::Earlier, HashOrder>& earlier) try {
+/// replacing  the list of the last run, if that replaces what is there
+void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, BatchRecord::Earlier, HashOrder>& earlier,
+               std::optional<Hash128>& replacing) try {
   if (!json_nests_within(line)) return;
   const Json json = parse_json(line);
+  if (json.contains("jobs")) {
+    Hash128 list;
+    const Json* overwrite = json.find("overwrite");
+    replacing = overwrite != nullptr && read_hex(overwrite->text(), list) ? std::optional(list) : std::nullopt;
+    return;
+  }
   const bool ended = json.contains("ended");
   const std::string id = json.at(ended ? "ended" : "begun").text(), position = output_in(json);
   BatchRecord::Earlier entry;
@@ -62,48 +70,99 @@ void read_line(const std::string& line, std::uint64_t at, std::map<Hash128, Batc
   return;
 }
 
-void read_entry(const std::string& line, std::uint64_t at, RecordedBatch& batch) try {
-  if (const auto plan = plan_in(line)) batch.plan = plan;
-  if (!json_nests_within(line)) return;
-  const Json json = parse_json(line);
-  if (const Json* count = json.find("jobs")) {
-    batch.planned = count->get<std::size_t>();
+/// Reads the lines of a record in order.
+class RecordReader {
+ public:
+  void read(const std::string& line, std::uint64_t at) try {
+    if (const auto plan = plan_in(line)) batch.plan = plan;
+    if (!json_nests_within(line)) return;
+    const Json json = parse_json(line);
+    if (const Json* count = json.find("jobs")) return begin_list(count->get<std::size_t>());
+    if (json.contains("kept")) return keep(json);
+    add(json, {at, static_cast<std::uint32_t>(line.size())});
+  } catch (const JsonError&) {
     return;
   }
-  const RecordedLine position{at, static_cast<std::uint32_t>(line.size())};
-  const bool ended = json.contains("ended");
-  RecordedJob entry;
-  entry.job.number = json.at("job").get<std::uint32_t>();
-  entry.job.output = output_in(json);
-  if (!read_hex(json.at(ended ? "ended" : "begun").text(), entry.job.id)) return;
-  const std::string& output = entry.job.output;
-  RecordedJob& known = batch.jobs[hash_text(output.empty() ? fmt::format("\n{}", entry.job.number) : output)];
-  if (!ended) {
-    entry.begun = position;
+
+  RecordedBatch batch;
+
+ private:
+  /// The id of a job, and its number if it has no output: equal jobs without output have one id.
+  using Key = std::pair<Hash128, std::uint32_t>;
+  struct KeyOrder {
+    bool operator()(const Key& a, const Key& b) const {
+      return a.first == b.first ? a.second < b.second : HashOrder()(a.first, b.first);
+    }
+  };
+
+  void begin_list(std::size_t count) {
+    for (auto& [number, job] : batch.jobs) {
+      const Key key{job.job.id, job.job.output.empty() ? number : 0};
+      if (job.ended) earlier_.insert_or_assign(key, std::move(job));
+    }
+    batch.jobs.clear();
+    batch.planned = count;
+  }
+
+  /// errors  throws JsonError
+  void keep(const Json& json) {
+    Hash128 id;
+    if (!read_hex(json.at("kept").text(), id)) return;
+    const auto number = json.at("job").get<std::uint32_t>();
+    auto found = earlier_.find({id, number});
+    if (found == earlier_.end()) found = earlier_.lower_bound({id, 0});
+    if (found == earlier_.end() || found->first.first != id) return;
+    RecordedJob& job = batch.jobs[number] = found->second;
+    job.job.number = number;
+    job.job.entry.source = json.at("source").text();
+  }
+
+  /// errors  throws JsonError
+  void add(const Json& json, const RecordedLine& position) {
+    const bool ended = json.contains("ended");
+    RecordedJob entry;
+    entry.job.number = json.at("job").get<std::uint32_t>();
+    entry.job.output = output_in(json);
+    if (!read_hex(json.at(ended ? "ended" : "begun").text(), entry.job.id)) return;
+    if (ended && !read_end(json, entry)) return;
+    RecordedJob& known = batch.jobs[entry.job.number];
+    if (!ended) {
+      entry.begun = position;
+    } else {
+      entry.result.line = position;
+      if (known.job.id == entry.job.id) entry.begun = known.begun;
+    }
     known = std::move(entry);
-    return;
   }
-  BatchResult& result = entry.result;
-  const std::optional<BatchOutcome> outcome = outcome_of(json.at("outcome").text());
-  if (!outcome || !read_hex(json.at("hash").text(), result.output.hash)) return;
-  result.outcome = *outcome;
-  json.at("code").get_to(result.code);
-  json.at("reason").get_to(result.reason);
-  json.at("seconds").get_to(result.seconds);
-  json.at("files").get_to(result.output.files);
-  json.at("bytes").get_to(result.output.bytes);
-  result.value = json.at("result");
-  result.take_warnings();
-  result.value = {};
-  result.line = position;
-  entry.job.entry.source = json.at("source").text();
-  entry.job.entry.words = json.at("words").get<std::vector<std::string>>();
-  if (known.job.id == entry.job.id) entry.begun = known.begun;
-  entry.ended = true;
-  if (const Json* elsewhere = json.find("elsewhere")) entry.elsewhere = elsewhere->get<bool>();
-  known = std::move(entry);
-} catch (const JsonError&) {
-  return;
+
+  /// errors  throws JsonError
+  static bool read_end(const Json& json, RecordedJob& entry) {
+    BatchResult& result = entry.result;
+    const std::optional<BatchOutcome> outcome = outcome_of(json.at("outcome").text());
+    if (!outcome || !read_hex(json.at("hash").text(), result.output.hash)) return false;
+    result.outcome = *outcome;
+    json.at("code").get_to(result.code);
+    json.at("reason").get_to(result.reason);
+    json.at("seconds").get_to(result.seconds);
+    json.at("files").get_to(result.output.files);
+    json.at("bytes").get_to(result.output.bytes);
+    result.value = json.at("result");
+    result.take_warnings();
+    result.value = {};
+    entry.job.entry.source = json.at("source").text();
+    entry.job.entry.words = json.at("words").get<std::vector<std::string>>();
+    entry.ended = true;
+    if (const Json* elsewhere = json.find("elsewhere")) entry.elsewhere = elsewhere->get<bool>();
+    return true;
+  }
+
+  std::map<Key, RecordedJob, KeyOrder> earlier_;  // that ended in the lists of earlier runs
+};
+
+Hash128 list_hash(const std::vector<BatchJob>& jobs) {
+  std::string words;
+  for (const BatchJob& job : jobs) words += hex(hash_text(job.entry.words.text()));
+  return hash_text(words);
 }
 
 }  // namespace
@@ -148,7 +207,7 @@ Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool
   std::optional<Hash128> recorded;
   const auto read = [&](const std::string& line, std::uint64_t at) {
     if (const auto found = plan_in(line)) recorded = found;
-    if (resume) read_line(line, at, record.earlier_);
+    if (resume) read_line(line, at, record.earlier_, record.replacing_);
   };
   if (Status status = resume || plan ? record.journal_.read(read) : Status(); !status) return status.error();
   const bool replaced = plan && recorded != *current;  // of another plan
@@ -159,6 +218,7 @@ Result<BatchRecord> BatchRecord::open(const BatchFiles& files, bool resume, bool
   }
   if (resume && !replaced) return record;
   record.earlier_.clear();
+  record.replacing_.reset();
   if (Status status = record.journal_.clear(); !status) return status.error();
   if (Status status = plan ? record.append(json_line({{"plan", hex(*current)}})) : Status(); !status) return status.error();
   return record;
@@ -174,7 +234,19 @@ Status BatchRecord::append(const std::string& line) {
   return status ? status : Error{status.error().fault, status.error().message + ", and continue with --resume"};
 }
 
-Status BatchRecord::planned(std::size_t jobs) { return append(json_line({{"jobs", jobs}})); }
+Status BatchRecord::planned(const std::vector<BatchJob>& jobs, bool overwrite) {
+  const Hash128 list = list_hash(jobs);
+  replaces_ = overwrite || replacing_ == list;
+  Json count = {{"jobs", jobs.size()}};
+  if (replaces_) count["overwrite"] = hex(list);
+  Status status = append(json_line(count));
+  for (const BatchJob& job : jobs) {
+    const Earlier* const known = job.refused ? nullptr : earlier(job);
+    if (!status || known == nullptr || !known->ended || known->begun != job.id) continue;
+    status = append(json_line({{"kept", hex(job.id)}, {"job", job.number}, {"source", job.entry.source}}));
+  }
+  return status;
+}
 
 Status BatchRecord::begun(const BatchJob& job, bool unowned) {
   Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.position()}};
@@ -230,10 +302,10 @@ Result<BatchResult> BatchRecord::kept(const Earlier& earlier) const {
 }
 
 Result<RecordedBatch> read_record(const BatchFiles& files) {
-  RecordedBatch batch;
-  Status status = read_journal(files.record(), [&](const std::string& line, std::uint64_t at) { read_entry(line, at, batch); });
+  RecordReader reader;
+  Status status = read_journal(files.record(), [&](const std::string& line, std::uint64_t at) { reader.read(line, at); });
   if (!status) return status.error();
-  return batch;
+  return std::move(reader.batch);
 }
 
 }  // namespace lamina::pipeline

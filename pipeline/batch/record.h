@@ -60,12 +60,15 @@ class BatchRecord {
                                   const std::function<Result<Hash128>()>& plan = {});
 
   const Earlier* earlier(const BatchJob& job) const;
+  /// Whether outputs that the record does not know are replaced: planned() decides.
+  bool replaces() const { return replaces_; }
   /// Of a job that ended and is kept; any thread may call it. errors  kOutput: the record cannot be read
   Result<BatchResult> kept(const Earlier& earlier) const;
 
   // --- from one thread at a time; errors  kOutput
-  /// The batch has so many jobs.
-  Status planned(std::size_t jobs);
+  /// The list of this run. Of earlier runs counts what has ended and is of the same job now, until the job begins again.
+  /// overwrite  what is where the jobs write is replaced, also by later runs of this list that continue the record
+  Status planned(const std::vector<BatchJob>& jobs, bool overwrite);
   /// unowned  the output path holds unrecorded files: a later run must not treat them as its own
   Status begun(const BatchJob& job, bool unowned);
   /// The value of the result goes; its line is noted.
@@ -78,6 +81,8 @@ class BatchRecord {
   BatchFiles files_;
   Journal journal_;
   std::map<Hash128, Earlier, HashOrder> earlier_;
+  std::optional<Hash128> replacing_;  // words of the list of an earlier run with --overwrite
+  bool replaces_ = false;
 };
 
 /// Values of results that a record has.
@@ -100,7 +105,7 @@ class RecordedValues {
   std::optional<FileReader> file_;
 };
 
-/// The last run of a job in a record.
+/// What a record has of a job in the list of the last run.
 struct RecordedJob {
   BatchJob job;        // number, entry, id; its output is the position
   BatchResult result;  // its value remains in the record
@@ -110,9 +115,9 @@ struct RecordedJob {
 };
 
 struct RecordedBatch {
-  std::size_t planned = 0;                         // jobs; 0 if unknown
-  std::optional<Hash128> plan;                     // generation of the plan of a share
-  std::map<Hash128, RecordedJob, HashOrder> jobs;  // by their output, or by number without one
+  std::size_t planned = 0;                    // jobs in that list; 0 if unknown
+  std::optional<Hash128> plan;                // generation of the plan of a share
+  std::map<std::uint32_t, RecordedJob> jobs;  // of the list of the last run, by number
 };
 
 /// Reads a record, also of a batch that is running, and changes nothing. errors  kOutput: it cannot be read

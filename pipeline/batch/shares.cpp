@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <numeric>
 #include <queue>
+#include <random>
 #include <set>
 #include <thread>
 #include <utility>
@@ -29,9 +30,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kFirstLine = "lamina shares\t2\n", kColumns = "job\tshare\tcost\twords\tsource\n", kEnd = "end\t";
-constexpr std::uint64_t kStartBytes = 64 << 10;  // what it costs to start a job, in bytes of a part
-constexpr std::uint64_t kMaxShares = 1'000'000;  // of read_shard()
+constexpr std::string_view kFirstLine = "lamina shares\t3\n", kColumns = "job\tshare\tcost\twords\tsource\n", kEnd = "end\t";
+constexpr std::string_view kYes = "yes", kNo = "no";  // of the line `overwrite`
+constexpr std::uint64_t kStartBytes = 64 << 10;       // what it costs to start a job, in bytes of a part
+constexpr std::uint64_t kMaxShares = 1'000'000;       // of read_shard()
 
 /// Cost of loading each part.
 using Loads = std::map<Hash128, std::uint64_t, HashOrder>;
@@ -143,8 +145,9 @@ bool read_planned_job(std::string_view line, std::size_t number, const SharePlan
 }
 
 std::string plan_text(const SharePlan& plan) {
-  std::string text = fmt::format("{}version\t{}\ngeneration\t{}\nshares\t{}\nwith\t{}\nunit\t{}\n{}", kFirstLine, plan.version,
-                                 hex(plan.generation), plan.shares, plan.with, plan.unit, kColumns);
+  std::string text =
+      fmt::format("{}version\t{}\ngeneration\t{}\nshares\t{}\nwith\t{}\nunit\t{}\noverwrite\t{}\n{}", kFirstLine, plan.version,
+                  hex(plan.generation), plan.shares, plan.with, plan.unit, plan.overwrite ? kYes : kNo, kColumns);
   for (std::size_t i = 0; i < plan.jobs.size(); ++i) {
     const PlannedJob& job = plan.jobs[i];
     text += fmt::format("{}\t{}\t{}\t{}\t{}\n", i + 1, job.share, job.cost, hex(job.words), job.source);
@@ -178,10 +181,10 @@ Status check_plan(const SharePlan& found, const SharePlan& own, const std::strin
                (longer ? own : found).jobs[both].source, both + 1, longer ? "not in" : "missing; it is in", path);
 }
 
-bool is_undivided_file(const std::string& name) { return name.starts_with("batch.") || name.starts_with("summary."); }
+bool is_undivided_file(std::string_view name) { return name.starts_with("batch.") || name.starts_with("summary."); }
 
-/// Files of the shares, or of an undivided batch. errors  of `fault`: one of them is running
-Result<std::vector<fs::path>> idle_files(const std::string& directory, bool undivided, Fault fault) {
+/// Files of the shares, or of an undivided batch.
+std::vector<fs::path> batch_files(const std::string& directory, bool undivided) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
@@ -189,6 +192,12 @@ Result<std::vector<fs::path>> idle_files(const std::string& directory, bool undi
     if (is_batch_file(name) && is_undivided_file(name) == undivided) files.push_back(entry->path());
   }
   std::ranges::sort(files);
+  return files;
+}
+
+/// As batch_files(). errors  of `fault`: one of them is running
+Result<std::vector<fs::path>> idle_files(const std::string& directory, bool undivided, Fault fault) {
+  std::vector<fs::path> files = batch_files(directory, undivided);
   for (const fs::path& file : files) {
     if (file.extension() == ".jsonl" && is_journal_held(file.string()))
       return failure(fault, "{}: is running in another process; wait for it", file.string());
@@ -196,13 +205,37 @@ Result<std::vector<fs::path>> idle_files(const std::string& directory, bool undi
   return files;
 }
 
-/// The file, locked until it is finished or discarded. Waits for a process that has the lock.
-Result<File> lock_file(const std::string& path, bool replace) {
-  for (int idle = 0;;) {
-    Result<File> file = File::open(path, {.follow = false, .replace = replace});
-    if (file || (check_not_being_written(path) && ++idle == 5)) return file;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+/// Tries to lock a plan. Of processes that try at once all may fail, so the pauses grow and are random.
+class PlanLock {
+ public:
+  PlanLock(std::string path, bool replace) : path_(std::move(path)), replace_(replace) {}
+
+  /// The file, locked until it is finished or discarded; nothing, after a pause, if another process had it.
+  /// errors  kOutput: it failed in many tries without another process in sight
+  Result<std::optional<File>> try_once() {
+    constexpr int kMaxIdle = 8;
+    Result<File> file = File::open(path_, {.follow = false, .replace = replace_});
+    if (file) return std::optional<File>(std::move(*file));
+    const bool there = is_file(path_), busy = !check_not_being_written(path_);
+    idle_ = busy || there != std::exchange(was_there_, there) ? 0 : idle_ + 1;
+    if (idle_ == kMaxIdle) return file.error();
+    std::this_thread::sleep_for(std::chrono::milliseconds(longest_ms_ / 2 + random_() % longest_ms_));
+    longest_ms_ = std::min(longest_ms_ * 3 / 2, 300u);
+    return std::optional<File>();
   }
+
+ private:
+  std::string path_;
+  bool replace_, was_there_ = is_file(path_);
+  int idle_ = 0;  // tries in a row
+  unsigned longest_ms_ = 20;
+  std::random_device random_;
+};
+
+Status make_directory(const std::string& directory) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  return error ? Status(failure(Fault::kOutput, "{}: {}", directory, error.message())) : Status();
 }
 
 Status remove_files(const std::string& directory, bool undivided) {
@@ -213,6 +246,8 @@ Status remove_files(const std::string& directory, bool undivided) {
     if (!error) fs::remove(file, error);
     if (error) return failure(Fault::kOutput, "{}: {}", file.string(), error.message());
   }
+  remove_leftovers(directory,
+                   [&](std::string_view name) { return is_batch_file(name) && is_undivided_file(name) == undivided; });
   return {};
 }
 
@@ -267,15 +302,14 @@ std::vector<std::uint64_t> SharePlan::costs() const {
   return sums;
 }
 
-Hash128 words_hash(const BatchJob& job) { return hash_text(fmt::format("{}\n{}", job.entry.words.text(), job.position())); }
-
 SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
                       const std::vector<std::string>& with, std::string_view unit) {
-  SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), {}, {}};
+  SharePlan plan{shares, std::string(version()), json_text(Json(with)), std::string(unit), false, {}, {}};
   const std::vector<DividedJob> divided = divide_jobs(costs, shares);
   plan.jobs.reserve(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i)
-    plan.jobs.push_back({divided[i].share, divided[i].cost, words_hash(jobs[i]), table_cell(jobs[i].entry.source)});
+    plan.jobs.push_back(
+        {divided[i].share, divided[i].cost, hash_text(jobs[i].entry.words.text()), table_cell(jobs[i].entry.source)});
   return plan;
 }
 
@@ -298,14 +332,16 @@ Result<SharePlan> read_plan(const std::string& directory) {
   SharePlan plan;
   std::uint64_t shares = 0;
   const auto version_text = take_value(text, "version"), generation = take_value(text, "generation"),
-             count = take_value(text, "shares"), with = take_value(text, "with"), unit = take_value(text, "unit");
-  if (!version_text || !generation || !count || !with || !unit || !read_hex(*generation, plan.generation) ||
-      !read_count(*count, kMaxShares, shares) || shares == 0)
+             count = take_value(text, "shares"), with = take_value(text, "with"), unit = take_value(text, "unit"),
+             overwrite = take_value(text, "overwrite");
+  if (!version_text || !generation || !count || !with || !unit || (overwrite != kYes && overwrite != kNo) ||
+      !read_hex(*generation, plan.generation) || !read_count(*count, kMaxShares, shares) || shares == 0)
     return damaged_plan(path);
   plan.shares = static_cast<std::uint32_t>(shares);
   plan.version = *version_text;
   plan.with = *with;
   plan.unit = *unit;
+  plan.overwrite = overwrite == kYes;
   if (!text.starts_with(kColumns)) return damaged_plan(path);
   text.remove_prefix(kColumns.size());
   while (!text.empty()) {
@@ -320,11 +356,10 @@ Result<SharePlan> read_plan(const std::string& directory) {
 }
 
 Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& own, bool overwrite) {
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
+  if (Status status = make_directory(directory); !status) return status.error();
   const std::string path = plan_path(directory);
   std::optional<File> file;
+  PlanLock lock(path, overwrite);
   while (true) {
     const bool replace = has_shares(directory);
     if (replace) {
@@ -334,11 +369,14 @@ Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& o
       if (!overwrite) return status.error();
     }
     if (!file) {  // another process may have written the plan before this one has the lock
-      Result<File> locked = lock_file(path, overwrite);
+      Result<std::optional<File>> locked = lock.try_once();
       if (!locked) return locked.error();
-      file.emplace(std::move(*locked));
+      file = std::move(*locked);
       continue;
     }
+    // A batch that is not divided may have begun, or its shares were merged, since this process has started.
+    if (Status status = overwrite ? remove_undivided_batch(directory) : check_not_undivided(directory); !status)
+      return status.error();
     SharePlan plan = own;
     std::string seed = temporary_name(path);  // random
     if (replace) {
@@ -353,7 +391,15 @@ Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& o
   }
 }
 
-Result<File> lock_plan(const std::string& directory) { return lock_file(plan_path(directory), true); }
+Result<File> lock_plan(const std::string& directory) {
+  if (Status status = make_directory(directory); !status) return status.error();
+  PlanLock lock(plan_path(directory), true);
+  while (true) {
+    Result<std::optional<File>> locked = lock.try_once();
+    if (!locked) return locked.error();
+    if (*locked) return std::move(**locked);
+  }
+}
 
 Result<Hash128> check_same_plan(const std::string& directory, const SharePlan& plan) {
   const std::string path = plan_path(directory);
@@ -371,7 +417,31 @@ bool has_undivided_batch(const std::string& directory) {
   return is_file(path) && fs::file_size(path, error) > 0 && !error;
 }
 
+Status check_not_undivided(const std::string& directory) {
+  const std::string path = BatchFiles(directory).record();
+  if (!has_undivided_batch(directory) && !is_journal_held(path)) return {};
+  return usage(
+      "{}: belongs to a batch without shares; continue it without shares, replace it with --overwrite, or name another directory",
+      path);
+}
+
 Status remove_shares(const std::string& directory) { return remove_files(directory, false); }
+
+Status remove_merged_shares(const std::string& directory) {
+  if (batch_files(directory, false).empty()) return remove_shares(directory);  // or what is left of their files
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  while (true) {
+    Status removed;
+    {
+      const Result<File> lock = lock_plan(directory);
+      if (!lock) return lock.error();
+      if (has_shares(directory)) return {};
+      removed = remove_shares(directory);
+    }
+    if (removed || std::chrono::steady_clock::now() > end) return removed;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
 
 Status remove_undivided_batch(const std::string& directory) { return remove_files(directory, true); }
 

@@ -52,17 +52,18 @@ inline constexpr std::string_view kPlannedUnit = "microseconds";  // of costs by
 struct PlannedJob {
   std::uint32_t share = 0;  // from 1
   std::uint64_t cost = 0;
-  Hash128 words;       // of its words and its output
+  Hash128 words;       // of its words in the list
   std::string source;  // "jobs.txt:12"
 };
 
 /// The plan: docs/reference/formats.md describes the file.
 struct SharePlan {
   std::uint32_t shares = 0;
-  std::string version;  // of lamina
-  std::string with;     // words of --with, as JSON
-  std::string unit;     // of the costs: kPlannedUnit or another one
-  Hash128 generation;   // repeated by the records of the shares; set by agree_on_plan()
+  std::string version;     // of lamina
+  std::string with;        // words of --with, as JSON
+  std::string unit;        // of the costs: kPlannedUnit or another one
+  bool overwrite = false;  // what is where the jobs write is replaced by the share that has not begun them yet
+  Hash128 generation;      // repeated by the records of the shares; set by agree_on_plan()
   std::vector<PlannedJob> jobs;
 
   /// Sums of the costs of all shares.
@@ -72,23 +73,22 @@ struct SharePlan {
 SharePlan plan_shares(const std::vector<BatchJob>& jobs, std::span<const CostedJob> costs, std::uint32_t shares,
                       const std::vector<std::string>& with, std::string_view unit);
 
-/// Hash of the words and the output of a job.
-Hash128 words_hash(const BatchJob& job);
-
 /// DIR/shares.tsv
 std::string plan_path(const std::string& directory);
 
 /// errors  kVerification: the file is damaged or missing
 Result<SharePlan> read_plan(const std::string& directory);
 
-/// Locks the plan, there or not, until the file is finished or discarded; waits for another process that has the lock.
-/// errors  kOutput
+/// Locks the plan, there or not, until the file is finished or discarded; waits for another process that has the lock. Makes
+/// the directory. errors  kOutput
 Result<File> lock_plan(const std::string& directory);
 
 /// The plan in the directory, which is `own` if there was none. A different plan is replaced with `overwrite` only. Its
-/// generation depends on the plan that it replaces, so that processes that start together replace a plan once.
+/// generation depends on the plan that it replaces, so that processes that start together replace a plan once. With `overwrite`
+/// a new plan also replaces a batch that is not divided.
 /// errors  kUsage: another number of shares, other words of --with, another version, another list (names the first difference),
-///         a share of the plan to be replaced is running; kVerification: the file is damaged; kOutput
+///         a share of the plan to be replaced is running, the directory belongs to a batch that is not divided;
+///         kVerification: the file is damaged; kOutput
 Result<SharePlan> agree_on_plan(const std::string& directory, const SharePlan& own, bool overwrite);
 
 /// Checks, with the record of a share open, that its plan was not replaced or merged. Waits for processes that lock the plan:
@@ -98,10 +98,15 @@ Result<Hash128> check_same_plan(const std::string& directory, const SharePlan& p
 /// Whether a directory belongs to a batch in shares; whether it belongs to one that is not divided.
 bool has_shares(const std::string& directory);
 bool has_undivided_batch(const std::string& directory);
+/// errors  kUsage: the directory belongs to a batch that is not divided, or such a batch is running
+Status check_not_undivided(const std::string& directory);
 
 /// Removes the files of the shares, or of an undivided batch, not the output of their jobs.
 /// errors  kOutput: one of them is running; kOutput: a file cannot be removed
 Status remove_shares(const std::string& directory);
 Status remove_undivided_batch(const std::string& directory);
+/// As remove_shares(), of shares without a plan. Waits up to 5 s for a share that has started and ends by check_same_plan().
+/// The caller has no lock of the plan.
+Status remove_merged_shares(const std::string& directory);
 
 }  // namespace lamina::pipeline

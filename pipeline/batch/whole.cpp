@@ -40,7 +40,7 @@ Status read_undivided(BatchDirectory& batch) {
     last = std::max<std::size_t>(last, job.job.number);
     if (job.ended) add_ended(std::move(job), state, batch);
   }
-  // A list that was shortened before --resume leaves more jobs in the record.
+  // A record whose first line was lost or is of an earlier version may have more jobs.
   state.jobs = std::max(record->planned > 0 ? record->planned : last, state.done + state.failed);
   batch.states.push_back(state);
   return {};
@@ -219,8 +219,7 @@ Status merge_shares(const BatchDirectory& batch, std::int64_t schema, const File
   // First the plan: without it the directory is that of an undivided batch.
   std::error_code error;
   fs::remove(plan_path(batch.directory), error);
-  if (error) return failure(Fault::kOutput, "{}: {}", plan_path(batch.directory), error.message());
-  return remove_shares(batch.directory);
+  return error ? Status(failure(Fault::kOutput, "{}: {}", plan_path(batch.directory), error.message())) : Status();
 }
 
 }  // namespace lamina::pipeline

@@ -50,8 +50,9 @@ Json status_json(const BatchDirectory& batch);
 /// What is missing, one line per share: "share 3 of 20: never started; run it with --shard 3/20".
 std::vector<std::string> missing_lines(const BatchDirectory& batch);
 
-/// Makes batch.jsonl, summary.json and summary.tsv from all shares, as an undivided batch writes them, then removes the files
-/// of the shares. No share is missing or running. The caller has the lock of the plan (shares.h) since it has read the batch.
+/// Makes batch.jsonl, summary.json and summary.tsv from all shares, as an undivided batch writes them, then removes the plan.
+/// No share is missing or running. The caller has the lock of the plan (shares.h) since it has read the batch, and calls
+/// remove_merged_shares() without it.
 /// schema  of summary.json
 /// errors  kOutput; kInterrupted: `cancel` was set before batch.jsonl was complete, and nothing is written
 Status merge_shares(const BatchDirectory& batch, std::int64_t schema, const FileOptions& how, const std::atomic<bool>& cancel);

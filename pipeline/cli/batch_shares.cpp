@@ -22,10 +22,15 @@ namespace {
 
 /// errors  kUsage: the directory belongs to a batch that is not divided, and is not overwritten
 Status check_divided(const BatchOptions& options) {
-  if (options.overwrite || has_shares(options.directory) || !has_undivided_batch(options.directory)) return {};
+  return options.overwrite || has_shares(options.directory) ? Status() : check_not_undivided(options.directory);
+}
+
+/// errors  kUsage: the directory belongs to a batch in shares, and is not overwritten
+Status check_undivided(const BatchOptions& options) {
+  if (options.overwrite || !has_shares(options.directory)) return {};
   return usage(
-      "{}: belongs to a batch without shares; continue it without shares, replace it with --overwrite, or name another directory",
-      BatchFiles(options.directory).record());
+      "{}: belongs to a batch in shares; continue it with --shard, join it with lamina merge, or replace it with --overwrite",
+      plan_path(options.directory));
 }
 
 /// The words without the output, which changes nothing in a dry run.
@@ -99,6 +104,7 @@ class DryRuns {
     BatchJob dry;
     dry.entry.words = words;
     dry.parsed = call->parsed;
+    dry.parsed = without_outputs(dry);
     CallSettings settings;
     settings.layer_bytes = job.layer_bytes;
     const double start = process_seconds();
@@ -134,7 +140,6 @@ Result<std::vector<BatchJob>> prepare_list(std::vector<BatchEntry> entries, cons
 
 /// Removes the files of the shares; a share that starts meanwhile waits and then finds no plan.
 Status replace_shares(const std::string& directory) {
-  if (!has_shares(directory)) return remove_shares(directory);
   const Result<File> lock = lock_plan(directory);
   return lock ? remove_shares(directory) : Status(lock.error());
 }
@@ -145,19 +150,19 @@ constexpr const char* kFileUnit = "bytes x layers/mm";
 
 Result<std::vector<BatchJob>> prepare_undivided(std::vector<BatchEntry> entries, const BatchShare& share,
                                                 const BatchOptions& options, std::optional<BatchRecord>& record) {
-  if (has_shares(options.directory) && !options.overwrite) {
-    return usage(
-        "{}: belongs to a batch in shares; continue it with --shard, join it with lamina merge, or replace it with --overwrite",
-        plan_path(options.directory));
-  }
+  if (Status status = check_undivided(options); !status) return status.error();
   auto jobs = prepare_batch(std::move(entries), share, read_call);
   if (!jobs) return jobs;
-  if (Status status = has_shares(options.directory) ? replace_shares(options.directory) : Status(); !status)
+  // Shares may have been planned, and run, meanwhile. None is planned until the record is open, and then it is refused.
+  const Result<File> lock = lock_plan(options.directory);
+  if (!lock) return lock.error();
+  if (Status status = check_undivided(options); !status) return status.error();
+  if (Status status = has_shares(options.directory) ? remove_shares(options.directory) : Status(); !status)
     return status.error();
   Result<BatchRecord> opened = BatchRecord::open(options.files(), options.resume, options.overwrite);
   if (!opened) return opened.error();
   record.emplace(std::move(*opened));
-  const Status planned = record->planned(jobs->size());
+  const Status planned = record->planned(*jobs, options.overwrite);
   return planned ? std::move(jobs) : planned.error();
 }
 
@@ -167,10 +172,8 @@ Result<std::vector<BatchJob>> prepare_share(std::vector<BatchEntry> entries, con
   std::vector<CostedJob> costs;
   auto jobs = prepare_list(std::move(entries), share, options, costs);
   if (!jobs) return jobs.error();
-  const SharePlan own = plan_shares(*jobs, costs, options.shares, with, kFileUnit);
-  if (options.overwrite) {
-    if (Status status = remove_undivided_batch(options.directory); !status) return status.error();
-  }
+  SharePlan own = plan_shares(*jobs, costs, options.shares, with, kFileUnit);
+  own.overwrite = options.overwrite;
   const Result<SharePlan> plan = agree_on_plan(options.directory, own, options.overwrite);
   if (!plan) return plan.error();
   const auto check = [&] { return check_same_plan(options.directory, *plan); };
@@ -182,7 +185,8 @@ Result<std::vector<BatchJob>> prepare_share(std::vector<BatchEntry> entries, con
     if (plan->jobs[i].share == options.share) chosen.push_back(std::move((*jobs)[i]));
   }
   identify_jobs(chosen, share, read_call);
-  return chosen;
+  const Status planned = record->planned(chosen, options.overwrite || plan->overwrite);
+  return planned ? Result<std::vector<BatchJob>>(std::move(chosen)) : planned.error();
 }
 
 Result<SharePlan> plan_by_dry_runs(std::vector<BatchEntry> entries, const BatchShare& share, const BatchOptions& options,
@@ -200,10 +204,10 @@ Result<SharePlan> plan_by_dry_runs(std::vector<BatchEntry> entries, const BatchS
     if (cancel) return failure(Fault::kInterrupted, "interrupted; no share is planned");
     progress(i + 1);
   }
-  for (const auto& remove : {replace_shares, remove_undivided_batch}) {
-    if (Status status = options.overwrite ? remove(options.directory) : Status(); !status) return status.error();
-  }
-  return agree_on_plan(options.directory, plan_shares(*jobs, costs, options.shares, with, kPlannedUnit), false);
+  if (Status status = options.overwrite ? replace_shares(options.directory) : Status(); !status) return status.error();
+  SharePlan plan = plan_shares(*jobs, costs, options.shares, with, kPlannedUnit);
+  plan.overwrite = options.overwrite;
+  return agree_on_plan(options.directory, plan, options.overwrite);
 }
 
 }  // namespace lamina::pipeline

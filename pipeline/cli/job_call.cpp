@@ -265,6 +265,12 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   return call;
 }
 
+PackedWords without_outputs(const BatchJob& job) {
+  CommandLine line = unpacked(job);
+  std::erase_if(line.arguments.options, [](const auto& option) { return is_output_option(option.first); });
+  return packed(line);
+}
+
 RunJob job_runner(const std::string& sync, std::shared_ptr<load::PartStore> loaded, std::shared_ptr<JobCache> cache) {
   return [sync, loaded = std::move(loaded), cache = std::move(cache)](const BatchJob& job, const CallSettings& settings,
                                                                       const ProgressCallback& progress,

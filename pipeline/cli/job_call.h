@@ -29,6 +29,9 @@ void add_container(std::vector<BatchEntry>& entries, const std::string& kind);
 /// errors  kUsage: no such command, wrong arguments, a job file that cannot be read
 Result<Call> read_call(const std::vector<std::string>& words);
 
+/// A command line that read_call() has read, without the options that name files to be written.
+PackedWords without_outputs(const BatchJob& job);
+
 /// Runs jobs whose command lines read_call() has read. The command's results and its first error are in the result; its
 /// messages are discarded.
 /// sync   when files are flushed to disk, for jobs without a setting of their own; "" for none

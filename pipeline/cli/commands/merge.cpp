@@ -62,9 +62,11 @@ Outcome merge_batch(const Arguments& arguments, Context& context) {
   complain_of(missing, directory, context);
   if (!missing.ok()) return static_cast<int>(Fault::kVerification);
   keep_on_signals();
-  const Status merged = batch->shares > 0 ? merge_shares(*batch, kJsonSchema, {.follow = false}, context.cancel())
-                                          : remove_shares(directory);  // that an interrupted merge left
-  if (!merged) return merged;
+  if (batch->shares > 0) {
+    if (Status merged = merge_shares(*batch, kJsonSchema, {.follow = false}, context.cancel()); !merged) return merged;
+  }
+  plan.reset();  // a share that waits ends, for it finds no plan
+  if (Status removed = remove_merged_shares(directory); !removed) return removed;
   if (!arguments.has("--quiet")) {
     context.say(batch->shares > 0 ? fmt::format("{}: {} jobs of {} shares joined", directory, batch->jobs.size(), batch->shares)
                                   : fmt::format("{}: is whole already, {} jobs", directory, batch->jobs.size()));

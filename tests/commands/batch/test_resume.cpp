@@ -206,6 +206,58 @@ TEST_F(JobsInBatch, WithoutItsRecordABatchRecognizesWhatIsDoneAndLeavesOtherJobs
   EXPECT_NE(outcome.err.find("out/a/manifest.json: a finished job"), std::string::npos) << outcome.err;
 }
 
+TEST_F(JobsInBatch, AfterACorrectedListOnlyItsJobsCount) {
+  write_boxes(3);
+  const std::string options = " --bed 60x60 --dpi 100 --layer 0.5 -o ";
+  const auto status_after = [&](const std::string& list, int code) {
+    write_text(directory_ / "list.txt", list);
+    const Outcome outcome = lamina({"batch", "list.txt", "-o", "out", "--resume", "--quiet"});
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    const Outcome status = lamina({"batch", "out", "--status"});
+    EXPECT_EQ(status.code, code) << status.err;
+    EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, code);
+    if (code == 0) {
+      EXPECT_EQ(lamina({"verify", "out", "--quiet"}).code, 0);
+    }
+    return status.out;
+  };
+  const std::string a = "jet part10.stl" + options + "a\n", b = "jet part11.stl" + options + "b\n", c = "info part10.stl\n";
+  EXPECT_EQ(status_after(a + "jet missing.stl -o c\n" + b + c + c, 3), "4 of 5 jobs done, 1 failed\n");
+  EXPECT_EQ(status_after(a + "jet part12.stl" + options + "d\n" + b + c + c, 0), "5 of 5 jobs done\n");
+  // A shorter list in another order, and the longer one again.
+  EXPECT_EQ(status_after(c + b, 0), "2 of 2 jobs done\n");
+  EXPECT_EQ(status_after(a + "jet part12.stl" + options + "d\n" + b + c + c, 0), "5 of 5 jobs done\n");
+  EXPECT_EQ(outcomes("out"), Words(5, "kept"));
+  // A job file that is refused, and repaired.
+  write_text(directory_ / "j.toml", "no job");
+  EXPECT_EQ(status_after(a + "jet --job j.toml\n", 2), "1 of 2 jobs done, 1 failed\n");
+  ASSERT_EQ(
+      lamina({"jet", "part10.stl", "--dpi", "100", "--layer", "0.5", "-o", "e", "--save-job", "g.toml", "--dry-run"}).code, 0);
+  fs::rename(directory_ / "g.toml", directory_ / "j.toml");
+  EXPECT_EQ(status_after(a + "jet --job j.toml\n", 0), "2 of 2 jobs done\n");
+}
+
+TEST_F(JobsInBatch, ABatchThatReplacesAnotherIsResumedAndReplacesItStill) {
+  write_boxes(3);
+  const std::string options = " --bed 60x60 --dpi 100 --layer ";
+  const auto write_list = [&](const std::string& layer) {
+    write_text(directory_ / "list.txt", "jet part10.stl" + options + layer + " -o a\njet nowhere.stl -o b\njet part11.stl" +
+                                            options + layer + " -o c\n");
+  };
+  write_list("0.5");
+  EXPECT_EQ(lamina({"batch", "list.txt", "-o", "out", "--quiet"}).code, 3);
+  write_list("0.25");
+  EXPECT_EQ(lamina({"batch", "list.txt", "-o", "out", "--quiet", "--overwrite", "--fail-fast", "--jobs", "1"}).code, 3);
+  EXPECT_EQ(outcomes("out"), (Words{"done", "failed", "not run"}));
+  EXPECT_EQ(lamina({"batch", "list.txt", "-o", "out", "--quiet", "--resume"}).code, 3);
+  EXPECT_EQ(outcomes("out"), (Words{"kept", "failed", "done"}));
+  // Another list replaces only what its record knows.
+  ASSERT_EQ(lamina({"jet", "part12.stl", "--dpi", "100", "--layer", "0.5", "-o", "out/d", "--quiet"}).code, 0);
+  write_text(directory_ / "list.txt", "jet part10.stl" + options + "0.25 -o a\njet part11.stl" + options + "0.25 -o d\n");
+  EXPECT_EQ(lamina({"batch", "list.txt", "-o", "out", "--quiet", "--resume"}).code, 2);
+  EXPECT_EQ(outcomes("out"), (Words{"kept", "failed"}));
+}
+
 TEST_F(JobsInBatch, TwoBatchesInOneDirectoryAreRefused) {
   write_boxes(1);
   fs::create_directories(directory_ / "out");
@@ -221,8 +273,8 @@ TEST_F(JobsInBatch, TwoBatchesInOneDirectoryAreRefused) {
 
 TEST_F(JobsInBatch, InterruptedItSaysHowToGoOn) {
   write_boxes(1);
-  const Words words = batch_of({"part10.stl", "-o", "out", "--resume"},
-                               {"--with", "jet --bed 400x400 --dpi 1200 --layer 0.0002"});
+  const Words words =
+      batch_of({"part10.stl", "-o", "out", "--resume"}, {"--with", "jet --bed 400x400 --dpi 1200 --layer 0.0002"});
   const Outcome outcome = lamina(words, [&](int process) {
     for (int i = 0; i < 2000 && !fs::exists(directory_ / "out/part10/layers/000000.tif"); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -280,6 +281,136 @@ TEST_F(BatchInShares, AShareThatStartsAsItsPlanIsMergedIsRefused) {
   EXPECT_GT(fs::file_size(record), 0u);
 }
 
+/// The lock of a plan, as a process that plans or merges shares has it.
+class PlanHeld {
+ public:
+  explicit PlanHeld(const fs::path& directory) : name_(directory / "shares.tsv.lamina-aaaaaaaaaaaaa.part") {
+    fs::create_directories(directory);
+    write_text(name_, "");
+    file_ = ::open(name_.c_str(), O_RDWR | O_CLOEXEC);
+    EXPECT_EQ(::flock(file_, LOCK_EX | LOCK_NB), 0);
+  }
+  PlanHeld(const PlanHeld&) = delete;
+  PlanHeld& operator=(const PlanHeld&) = delete;
+  ~PlanHeld() {
+    fs::remove(name_);
+    ::close(file_);
+  }
+
+ private:
+  std::string name_;
+  int file_ = -1;
+};
+
+TEST_F(BatchInShares, PlannedAndRunWhileABatchWithoutSharesPreparesTheyStay) {
+  write_list();
+  for (const char* shard : {"1/2", "2/2"}) share(shard);
+  fs::rename(directory_ / "out", directory_ / "ready");
+  Outcome undivided;
+  std::optional<PlanHeld> held(directory_ / "out");
+  std::thread process([&] { undivided = lamina({"batch", "jobs.txt", "-o", "out", "--quiet"}); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));  // it has found no plan and waits for the lock
+  for (const auto& entry : fs::directory_iterator(directory_ / "ready"))
+    fs::rename(entry.path(), directory_ / "out" / entry.path().filename());
+  held.reset();
+  process.join();
+  EXPECT_EQ(undivided.code, 2) << undivided.err;
+  EXPECT_NE(undivided.err.find("out/shares.tsv: belongs to a batch in shares"), std::string::npos) << undivided.err;
+  EXPECT_FALSE(fs::exists(directory_ / "out/batch.jsonl"));
+  EXPECT_EQ(lamina({"batch", "out", "--status"}).code, 3);
+}
+
+TEST_F(BatchInShares, AShareThatStartsAsAMergeEndsDividesNothingAgain) {
+  write_list();
+  ASSERT_EQ(lamina({"batch", "jobs.txt", "-o", "whole", "--quiet"}).code, 3);
+  Outcome started;
+  std::optional<PlanHeld> held(directory_ / "out");
+  std::thread process([&] { started = share("2/2", {"--resume"}); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));  // it has found no batch and waits for the lock
+  fs::copy(directory_ / "whole/batch.jsonl", directory_ / "out/batch.jsonl");
+  held.reset();
+  process.join();
+  EXPECT_EQ(started.code, 2) << started.err;
+  EXPECT_NE(started.err.find("out/batch.jsonl: belongs to a batch without shares"), std::string::npos) << started.err;
+  EXPECT_EQ(files_of_batch("out"), Words{"batch.jsonl"});
+}
+
+TEST_F(BatchInShares, OfAPlanWithOverwriteTheyReplaceOutputsAndContinueTheirOwn) {
+  write_boxes(2);
+  const std::string options = " --bed 60x60 --dpi 100 --layer 0.";
+  const auto write_jobs = [&](const std::string& layer, const std::string& first, const std::string& second) {
+    const std::string more = ".stl" + options + layer + " -o ";
+    write_text(directory_ / "jobs.txt", "jet part1" + first + more + "a\njet part1" + second + more + "b\nextrude part1" +
+                                            first + ".stl --layer 0." + layer + " -o c.gcode\n");
+  };
+  const auto run = [&](const std::string& batch, const Words& more) {
+    Words words = {"batch", "jobs.txt", "-o", batch, "--quiet"};
+    words.insert(words.end(), more.begin(), more.end());
+    return lamina(words);
+  };
+  write_jobs("4", "0", "1");
+  ASSERT_EQ(run("out", {}).code + run("old", {}).code, 0);
+  write_jobs("2", "1", "0");
+  ASSERT_EQ(run("fresh", {}).code, 0);
+  EXPECT_EQ(run("out", {"--plan-shares", "2", "--overwrite"}).code, 0);
+  for (const char* shard : {"1/2", "2/2"}) {
+    const Outcome outcome = share(shard, {"--resume"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+  }
+  const auto expect_fresh = [&] {
+    EXPECT_EQ(tree("out"), tree("fresh"));
+    EXPECT_EQ(read_text(directory_ / "out/c.gcode"), read_text(directory_ / "fresh/c.gcode"));
+  };
+  expect_fresh();
+  // As a kill leaves it that came once all jobs had begun, before the first one replaced what was there.
+  std::vector<fs::path> records;
+  for (const char* name : {"batch-1-of-2.jsonl", "batch-2-of-2.jsonl"}) {
+    std::istringstream record(read_text(directory_ / ("out/" + std::string(name))));
+    std::string begun;
+    for (std::string line; std::getline(record, line);) begun += line.find("\"ended\"") == std::string::npos ? line + "\n" : "";
+    write_text(directory_ / ("out/" + std::string(name)), begun);
+  }
+  for (const char* name : {"a", "b", "c.gcode", "c.gcode.json"}) {
+    fs::remove_all(directory_.path() / "out" / name);
+    fs::copy(directory_.path() / "old" / name, directory_.path() / "out" / name, fs::copy_options::recursive);
+  }
+  for (const char* shard : {"1/2", "2/2"}) EXPECT_EQ(share(shard, {"--resume"}).code, 0);
+  expect_fresh();
+  // What a share has done it keeps.
+  for (const char* shard : {"1/2", "2/2"}) EXPECT_EQ(share(shard, {"--resume"}).code, 0);
+  EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 0);
+  EXPECT_EQ(run("out", {"--resume"}).code, 0);
+  EXPECT_EQ(outcomes("out"), Words(3, "kept"));
+  // Shares of a plan without --overwrite leave what is there.
+  fs::remove(directory_ / "old/batch.jsonl");
+  EXPECT_EQ(run("old", {"--plan-shares", "1"}).code, 0);
+  EXPECT_EQ(run("old", {"--shard", "1/1", "--resume"}).code, 2);
+}
+
+TEST_F(BatchInShares, ARepairedJobFileDoesNotBlockThemAndCountsOnce) {
+  write_boxes(2);
+  ASSERT_EQ(lamina({"jet", "part10.stl", "--bed", "60x60", "--dpi", "100", "--layer", "0.5", "-o", "out/d", "--save-job",
+                    "good.toml", "--dry-run"})
+                .code,
+            0);
+  write_text(directory_ / "j.toml", "no job");
+  write_text(directory_ / "jobs.txt",
+             "jet part10.stl --bed 60x60 --dpi 100 --layer 0.5 -o a\njet --job j.toml\ninfo part10.stl\ninfo part10.stl\n");
+  EXPECT_EQ(share("1/2").code + share("2/2").code, 2);
+  EXPECT_EQ(lamina({"batch", "out", "--status"}).code, 2);
+  fs::copy_file(directory_ / "good.toml", directory_ / "j.toml", fs::copy_options::overwrite_existing);
+  for (const char* shard : {"1/2", "2/2"}) {
+    const Outcome outcome = share(shard, {"--resume"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+  }
+  const Json status = Json::parse(lamina({"batch", "out", "--status", "--json"}).out);
+  EXPECT_EQ(status["code"], 0);
+  EXPECT_EQ(status["done"], 4);
+  EXPECT_EQ(lamina({"merge", "out", "--quiet"}).code, 0);
+  EXPECT_EQ(outcomes("out").size(), 4u);
+  EXPECT_EQ(lamina({"batch", "out", "--status"}).out, "4 of 4 jobs done\n");
+}
+
 TEST_F(BatchInShares, MergeNamesWhatIsMissingAndWritesNothing) {
   write_list();
   share("1/3");
@@ -371,6 +502,38 @@ TEST_F(BatchInShares, ForSlurmStandardInputIsRefusedInOneLine) {
   const int status = std::system(("LAMINA=false '" + program + "' 2 - -o out 2>'" + err + "'").c_str());
   EXPECT_EQ(WEXITSTATUS(status), 2);
   EXPECT_EQ(read_text(err), "scripts/cluster/slurm_batch: -: the tasks cannot read standard input; write the list to a file\n");
+}
+
+TEST_F(BatchInShares, ForSlurmSharesOfAReplacedBatchReplaceItsOutputs) {
+  write_boxes(1);
+  const auto write_jobs = [&](const std::string& layer) {
+    write_text(directory_ / "jobs.txt", "jet part10.stl --bed 60x60 --dpi 100 --layer " + layer + " -o a\n");
+  };
+  write_jobs("0.5");
+  ASSERT_EQ(lamina({"batch", "jobs.txt", "-o", "out", "--quiet"}).code, 0);
+  write_jobs("0.25");
+  // Runs each script at once, an array as its first task.
+  write_text(directory_ / "sbatch", "#!/bin/bash\nSLURM_ARRAY_TASK_ID=1 bash >&2 || echo failed >&2\necho 1\n");
+  fs::permissions(directory_ / "sbatch", fs::perms::owner_all);
+  const std::string program = fs::path(LAMINA_TEST_DIR).parent_path() / "scripts/cluster/slurm_batch", err = directory_ / "err";
+  const int status = std::system(("cd '" + directory_.path().string() + "' && PATH=$PWD:$PATH LAMINA='" LAMINA_PROGRAM "' '" +
+                                  program + "' 1 jobs.txt -o out --overwrite --quiet >/dev/null 2>'" + err + "'")
+                                     .c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(read_text(err), "out: 1 jobs of 1 shares joined\n");
+  EXPECT_EQ(outcomes("out"), Words{"done"});
+  EXPECT_EQ(files_of_batch("out"), kFilesOfUndivided);
+}
+
+TEST_F(BatchInShares, PlanSharesWritesNoFilesThatJobsName) {
+  write_boxes(1);
+  write_text(directory_ / "jobs.txt", "jet part10.stl --layer 0.5 --machine jet1000 --quote q.csv --save-job=s.toml -o a\n");
+  EXPECT_EQ(lamina({"batch", "jobs.txt", "-o", "out", "--plan-shares", "2", "--quiet"}).code, 0);
+  EXPECT_FALSE(fs::exists(directory_ / "q.csv"));
+  EXPECT_FALSE(fs::exists(directory_ / "s.toml"));
+  EXPECT_EQ(share("1/2").code + share("2/2").code, 0);
+  EXPECT_TRUE(fs::exists(directory_ / "q.csv"));
+  EXPECT_TRUE(fs::exists(directory_ / "s.toml"));
 }
 
 TEST_F(BatchInShares, PlanSharesEstimatesByDryRunsAndRunsNoJob) {

@@ -6,9 +6,12 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <random>
 #include <set>
+#include <thread>
 
+#include "stages/support/io/journal.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -196,6 +199,46 @@ TEST(Shares, APlanThatDiffersIsRefusedWithTheFirstDifference) {
   const auto replaced = agree_on_plan(out, plan_of({"x"}, 3), true);
   ASSERT_TRUE(replaced);
   EXPECT_EQ(read_plan(out)->shares, 3u);
+}
+
+TEST(Shares, ManyProcessesThatStartTogetherAgreeOnOnePlan) {
+  const test::Directory directory;
+  const std::string out = directory.path().string();
+  const SharePlan plan = plan_of({"a", "b", "c"}, 2);
+  std::vector<std::optional<Result<SharePlan>>> agreed(48);
+  std::vector<std::thread> processes;
+  for (auto& result : agreed) processes.emplace_back([&] { result.emplace(agree_on_plan(out, plan, false)); });
+  for (std::thread& process : processes) process.join();
+  const Hash128 generation = read_plan(out)->generation;
+  for (const auto& result : agreed) {
+    ASSERT_TRUE(*result) << result->error().message;
+    EXPECT_EQ((*result)->generation, generation);
+  }
+}
+
+TEST(Shares, OfAMergedBatchAFileGoesOnceTheShareThatHoldsItEnds) {
+  const test::Directory directory;
+  const std::string out = directory.path().string(), record = directory / "batch-1-of-2.jsonl";
+  test::write_text(record, "{}\n");
+  for (const char* name : {"shares.tsv.lamina-aaaaaaaaaaaaa.part", "summary-1-of-2.json.lamina-aaaaaaaaaaaaa.part",
+                           "batch.jsonl", "other.lamina-aaaaaaaaaaaaa.part"})
+    test::write_text(directory / name, "");
+  std::optional<Result<Journal>> held(Journal::open(record, "is held"));
+  ASSERT_TRUE(*held);
+  EXPECT_FALSE(remove_shares(out));
+  std::thread share([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    held.reset();
+  });
+  const Status removed = remove_merged_shares(out);
+  share.join();
+  EXPECT_TRUE(removed) << removed.error().message;
+  EXPECT_EQ(test::files_below(directory.path()), (std::vector<std::string>{"batch.jsonl", "other.lamina-aaaaaaaaaaaaa.part"}));
+  // Shares that are planned again meanwhile stay.
+  test::write_text(record, "{}\n");
+  ASSERT_TRUE(agree_on_plan(out, plan_of({"a"}, 2), false));
+  EXPECT_TRUE(remove_merged_shares(out));
+  EXPECT_TRUE(has_shares(out));
 }
 
 TEST(Shares, FilesOfABatchAreRecognizedByName) {
