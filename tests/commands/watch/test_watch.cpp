@@ -624,7 +624,7 @@ TEST_F(WatchedFolder, ACommandAfterAJobEndsAtItsTimeLimitOrAtAStopEvenIfItIgnore
 
 TEST_F(WatchedFolder, AJobThatTakesTooLongFailsAndItsCommandRuns) {
   put_box("in/a.stl", 12);
-  const Outcome outcome = watch({"--with", "jet --bed 20x20 --dpi 2400 --layer 0.001 --sync off", "--time-limit", "0.2",
+  const Outcome outcome = watch({"--with", "jet --bed 20x20 --dpi 2400 --layer 0.0002 --sync off", "--time-limit", "0.2",
                                  "--then", "sleep 0.5; echo $LAMINA_CODE > then.txt"});
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   EXPECT_EQ(read_text(directory_ / "out/a.error.txt"), "took longer than its time limit of 0.2 s\n");
